@@ -1,0 +1,170 @@
+"""What a clip is: a skeleton and its motion. No file format and no network in here.
+
+Units and axes: metres, Y up, right-handed; unit quaternions (w, x, y, z); frames are 0-based.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from interpose.errors import RequestError, unknown
+from interpose.geometry import kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class Skeleton:
+    """A tree of joints with its rest transforms; parents come before their children.
+
+    Attributes:
+        names: unique joint names.
+        parents: index of each joint's parent, -1 for roots (there may be several).
+        rest_translation: (J, 3) metres, from the parent, in the parent's axes: the bone vectors.
+        rest_rotation: (J, 4) local rotation of the rest pose; identity where a format has none.
+        rest_scale: (J,) uniform scale of a joint, applied to everything below it.
+    """
+
+    names: tuple[str, ...]
+    parents: tuple[int, ...]
+    rest_translation: np.ndarray
+    rest_rotation: np.ndarray = None  # type: ignore[assignment]
+    rest_scale: np.ndarray = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        count = len(self.names)
+        fill = object.__setattr__
+        fill(self, "rest_translation", np.asarray(self.rest_translation, float).reshape(count, 3))
+        if self.rest_rotation is None:
+            fill(self, "rest_rotation", np.tile([1.0, 0, 0, 0], (count, 1)))
+        if self.rest_scale is None:
+            fill(self, "rest_scale", np.ones(count))
+        if len(set(self.names)) != count:
+            twice = sorted({name for name in self.names if self.names.count(name) > 1})
+            raise RequestError("the skeleton is ambiguous", f"joint names occur twice: {', '.join(twice)}")
+        if len(self.parents) != count or any(not -1 <= p < j for j, p in enumerate(self.parents)):
+            raise RequestError("the skeleton is no tree", "every parent must come before its children")
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def index(self, name: str) -> int:
+        """The index of a joint; raises RequestError listing all joints when there is none."""
+        try:
+            return self.names.index(name)
+        except ValueError:
+            raise unknown("joint", name, self.names) from None
+
+    @cached_property
+    def roots(self) -> tuple[int, ...]:
+        return tuple(j for j, parent in enumerate(self.parents) if parent < 0)
+
+    @cached_property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        below: list[list[int]] = [[] for _ in self.names]
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                below[parent].append(joint)
+        return tuple(map(tuple, below))
+
+    def ancestors(self, joint: int) -> tuple[int, ...]:
+        """The joints from the parent of `joint` up to its root."""
+        path = []
+        while (joint := self.parents[joint]) >= 0:
+            path.append(joint)
+        return tuple(path)
+
+    @cached_property
+    def scale_above(self) -> np.ndarray:
+        """(J,) product of the scales of all ancestors: what a bone vector is multiplied with."""
+        above = np.ones(len(self))
+        for joint, parent in enumerate(self.parents):
+            if parent >= 0:
+                above[joint] = above[parent] * self.rest_scale[parent]
+        return above
+
+
+@dataclass(frozen=True, eq=False)
+class Clip:
+    """Motion of a skeleton over time, always finite: what is missing stands in an Observation beside it.
+
+    Attributes:
+        skeleton: the joints.
+        rotation: (F, J, 4) local rotations.
+        translation: (F, K, 3) metres: local translations of the joints in `translated`. A root's is its
+            global position.
+        fps: frames a second.
+        translated: the K joints whose translation is animated; the roots, and others where a file has
+            them. All other joints keep the skeleton's rest translation.
+        name: where the clip came from, for reports.
+        source: what the file format adds (layout, original text); opaque here, used when writing.
+    """
+
+    skeleton: Skeleton
+    rotation: np.ndarray
+    translation: np.ndarray
+    fps: float
+    translated: tuple[int, ...] = ()
+    name: str = ""
+    source: Any = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        fill = object.__setattr__
+        if not self.translated:
+            fill(self, "translated", self.skeleton.roots)
+        fill(self, "rotation", np.asarray(self.rotation, float))
+        fill(self, "translation", np.asarray(self.translation, float))
+        frames, joints = self.rotation.shape[0], len(self.skeleton)
+        if self.rotation.shape != (frames, joints, 4):
+            raise RequestError("rotations do not fit", f"expected (F, {joints}, 4), got {self.rotation.shape}")
+        if self.translation.shape != (frames, len(self.translated), 3):
+            raise RequestError(
+                "translations do not fit",
+                f"expected ({frames}, {len(self.translated)}, 3), got {self.translation.shape}",
+            )
+        if not (np.isfinite(self.fps) and self.fps > 0):
+            raise RequestError("the frame rate is wrong", f"it must be above zero, got {self.fps}")
+        if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
+            raise RequestError(
+                "the clip has values that are no numbers",
+                "a clip is always finite",
+                "Use interpose.Observation.from_nan to turn NaN into missing values first.",
+            )
+
+    def __len__(self) -> int:
+        return self.rotation.shape[0]
+
+    @property
+    def seconds(self) -> float:
+        return len(self) / self.fps
+
+    @property
+    def root(self) -> np.ndarray:
+        """(F, 3) position of the first root."""
+        return self.translation[:, self.translated.index(self.skeleton.roots[0])]
+
+    def local_translation(self) -> np.ndarray:
+        """(F, J, 3) local translations of all joints, scales of the joints above included."""
+        everything = np.broadcast_to(self.skeleton.rest_translation, (len(self), len(self.skeleton), 3)).copy()
+        everything[:, list(self.translated)] = self.translation
+        return everything * self.skeleton.scale_above[:, None]
+
+    def kinematics(self) -> tuple[np.ndarray, np.ndarray]:
+        """Global rotations (F, J, 4) and global positions (F, J, 3)."""
+        return kinematics.forward(self.rotation, self.local_translation(), self.skeleton.parents)
+
+    def positions(self) -> np.ndarray:
+        """(F, J, 3) global joint positions in metres."""
+        return self.kinematics()[1]
+
+    def slice(self, start: int, stop: int) -> Clip:
+        """Frames start to stop - 1, as a clip of its own without the file's layout."""
+        return replace(
+            self, rotation=self.rotation[start:stop], translation=self.translation[start:stop], source=None
+        )
+
+    def with_motion(self, rotation: np.ndarray, translation: np.ndarray) -> Clip:
+        """The same clip with other motion; the file's layout stays for writing."""
+        return replace(self, rotation=rotation, translation=translation)

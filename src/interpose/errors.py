@@ -1,0 +1,41 @@
+"""Errors that a user can act on: what happened, why, and what to do about it."""
+
+from __future__ import annotations
+
+
+class InterposeError(ValueError):
+    """One line what, one line why, one line what to do.
+
+    Args:
+        what: what could not be done, with the name of the file or value concerned.
+        why: the reason, with the offending value.
+        fix: what the user can type or change.
+    """
+
+    exit_code = 2
+
+    def __init__(self, what: str, why: str = "", fix: str = "") -> None:
+        self.what, self.why, self.fix = what, why, fix
+        super().__init__("\n".join(line for line in (what, why, fix) if line))
+
+
+class RequestError(InterposeError):
+    """The request itself is wrong: an unknown joint, a range outside the clip, an existing output."""
+
+
+class FileError(InterposeError):
+    """The input cannot be read: missing, binary, truncated or contradicting itself."""
+
+    exit_code = 3
+
+
+def unknown(kind: str, name: object, choices: object) -> RequestError:
+    """The error for a name that is not in a list; the list is in the message, nearest names first."""
+    import difflib
+
+    names = [str(choice) for choice in choices]  # type: ignore[attr-defined]
+    near = difflib.get_close_matches(str(name), names, n=3, cutoff=0.5)
+    hint = f"Did you mean {' or '.join(near)}? " if near else ""
+    return RequestError(
+        f"unknown {kind}: {name}", f"it is none of: {', '.join(names)}", f"{hint}Choose one of the names above."
+    )

@@ -1,0 +1,1 @@
+"""Rotations, kinematics, ground plane and time, for NumPy arrays and torch tensors alike."""

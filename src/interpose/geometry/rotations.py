@@ -1,0 +1,272 @@
+"""Rotations as unit quaternions (w, x, y, z), written once for NumPy and torch.
+
+Every function takes arrays of shape (..., n) and broadcasts over the leading axes; angles are radians.
+Products read like matrices: ``multiply(a, b)`` first turns by ``b``, then by ``a``.
+All of them are smooth where the rotation is: at identity and at half turns gradients stay finite.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from array_api_compat import array_namespace
+
+Array = Any
+AXES = "XYZ"
+
+
+def identity(*shape: int, like: Array = None) -> Array:
+    """The identity quaternion in an array of shape (*shape, 4), of the kind and precision of `like`."""
+    if like is None:
+        import numpy as np
+
+        like = np.zeros(())
+    xp = array_namespace(like)
+    one = xp.zeros((*shape, 4), dtype=like.dtype, device=like.device if hasattr(like, "device") else None)
+    one[..., 0] = 1.0
+    return one
+
+
+def normalize(q: Array) -> Array:
+    """The unit vector along `q` (..., n); zero vectors stay zero."""
+    xp = array_namespace(q)
+    square = xp.sum(q * q, axis=-1, keepdims=True)
+    safe = xp.where(square > 0, square, xp.ones_like(square))
+    return q / xp.sqrt(safe)
+
+
+def multiply(a: Array, b: Array) -> Array:
+    """Hamilton product (..., 4): the rotation `b` followed by `a`."""
+    xp = array_namespace(a, b)
+    aw, ax, ay, az = (a[..., i] for i in range(4))
+    bw, bx, by, bz = (b[..., i] for i in range(4))
+    return xp.stack(
+        [
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        ],
+        axis=-1,
+    )
+
+
+def conjugate(q: Array) -> Array:
+    """The inverse of a unit quaternion (..., 4)."""
+    xp = array_namespace(q)
+    return xp.concat([q[..., :1], -q[..., 1:]], axis=-1)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Cross product of (..., 3) vectors, broadcasting."""
+    xp = array_namespace(a, b)
+    a0, a1, a2 = (a[..., i] for i in range(3))
+    b0, b1, b2 = (b[..., i] for i in range(3))
+    return xp.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+
+
+def rotate(q: Array, v: Array) -> Array:
+    """The vectors `v` (..., 3) turned by `q` (..., 4)."""
+    t = 2.0 * cross(q[..., 1:], v)
+    return v + q[..., :1] * t + cross(q[..., 1:], t)
+
+
+def exp(rotvec: Array) -> Array:
+    """Rotation vector (..., 3), axis times angle, to quaternion (..., 4)."""
+    xp = array_namespace(rotvec)
+    square = xp.sum(rotvec * rotvec, axis=-1, keepdims=True)
+    small = square < 1e-8
+    angle = xp.sqrt(xp.where(small, xp.ones_like(square), square))
+    # sin(a/2)/a: its series near zero keeps the gradient finite.
+    factor = xp.where(small, 0.5 - square / 48.0, xp.sin(0.5 * angle) / angle)
+    real = xp.where(small, 1.0 - square / 8.0, xp.cos(0.5 * angle))
+    return xp.concat([real, factor * rotvec], axis=-1)
+
+
+def log(q: Array) -> Array:
+    """Quaternion (..., 4) to the shortest rotation vector (..., 3), of length at most pi."""
+    xp = array_namespace(q)
+    q = xp.where(q[..., :1] < 0, -q, q)
+    real, imaginary = q[..., :1], q[..., 1:]
+    square = xp.sum(imaginary * imaginary, axis=-1, keepdims=True)
+    small = square < 1e-8
+    sine = xp.sqrt(xp.where(small, xp.ones_like(square), square))
+    angle = 2.0 * xp.atan2(sine, xp.where(small, xp.ones_like(real), real))
+    safe_real = xp.where(small, real, xp.ones_like(real))
+    series = (2.0 - 2.0 * square / (3.0 * safe_real * safe_real)) / safe_real
+    return xp.where(small, series, angle / sine) * imaginary
+
+
+def angle(a: Array, b: Array) -> Array:
+    """The angle in radians (0 to pi) between the rotations `a` and `b` (..., 4): shape (...)."""
+    xp = array_namespace(a, b)
+    difference = log(multiply(conjugate(a), b))
+    return xp.sqrt(xp.sum(difference * difference, axis=-1))
+
+
+def slerp(a: Array, b: Array, t: Array) -> Array:
+    """From `a` to `b` (..., 4) along the short way; `t` (...) is 0 at `a` and 1 at `b`.
+
+    Source: Shoemake, Animating Rotation with Quaternion Curves, 1985.
+    """
+    xp = array_namespace(a, b)
+    cosine = xp.sum(a * b, axis=-1, keepdims=True)
+    b = xp.where(cosine < 0, -b, b)
+    t = xp.asarray(t, dtype=a.dtype) if not hasattr(t, "dtype") else t
+    return normalize(multiply(a, exp(t[..., None] * log(multiply(conjugate(a), b)))))
+
+
+def to_matrix(q: Array) -> Array:
+    """Unit quaternion (..., 4) to rotation matrix (..., 3, 3), for column vectors."""
+    xp = array_namespace(q)
+    w, x, y, z = (q[..., i] for i in range(4))
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_matrix(m: Array) -> Array:
+    """Rotation matrix (..., 3, 3) to quaternion (..., 4) with w >= 0.
+
+    Of the four ways to write the quaternion the best conditioned one is taken (Shepperd 1978).
+    """
+    xp = array_namespace(m)
+    m00, m11, m22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    a, b, c = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
+    d, e, f = m[..., 1, 0] + m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 2, 1] + m[..., 1, 2]
+    candidates = xp.stack(
+        [
+            xp.stack([1 + m00 + m11 + m22, a, b, c], axis=-1),
+            xp.stack([a, 1 + m00 - m11 - m22, d, e], axis=-1),
+            xp.stack([b, d, 1 - m00 + m11 - m22, f], axis=-1),
+            xp.stack([c, e, f, 1 - m00 - m11 + m22], axis=-1),
+        ],
+        axis=-2,
+    )
+    diagonal = xp.stack([candidates[..., i, i] for i in range(4)], axis=-1)
+    best = xp.argmax(diagonal, axis=-1)[..., None]
+    q = candidates[..., 0, :]
+    for i in range(1, 4):
+        q = xp.where(best == i, candidates[..., i, :], q)
+    q = normalize(q)
+    return xp.where(q[..., :1] < 0, -q, q)
+
+
+def to_6d(q: Array) -> Array:
+    """Quaternion (..., 4) to the first two columns of its matrix, one after the other (..., 6).
+
+    Source: Zhou et al., On the Continuity of Rotation Representations in Neural Networks, 2019.
+    """
+    xp = array_namespace(q)
+    m = to_matrix(q)
+    return xp.concat([m[..., :, 0], m[..., :, 1]], axis=-1)
+
+
+def from_6d(v: Array) -> Array:
+    """Two columns (..., 6), made orthonormal by Gram and Schmidt, to quaternion (..., 4)."""
+    xp = array_namespace(v)
+    x = normalize(v[..., :3])
+    second = v[..., 3:]
+    y = normalize(second - xp.sum(x * second, axis=-1, keepdims=True) * x)
+    return from_matrix(xp.stack([x, y, cross(x, y)], axis=-1))
+
+
+def about(axis: str, angles: Array) -> Array:
+    """Turns by `angles` (...) about the coordinate axis "X", "Y" or "Z": quaternions (..., 4)."""
+    xp = array_namespace(angles)
+    parts = [xp.cos(0.5 * angles)] + [xp.zeros_like(angles)] * 3
+    parts[1 + AXES.index(axis.upper())] = xp.sin(0.5 * angles)
+    return xp.stack(parts, axis=-1)
+
+
+def from_euler(angles: Array, order: str) -> Array:
+    """Euler angles (..., 3), listed in the order of `order`, to quaternion (..., 4).
+
+    "ZXY" means the matrix product Rz Rx Ry (intrinsic), which is how BVH channels are read.
+    """
+    q = about(order[0], angles[..., 0])
+    for i in range(1, len(order)):
+        q = multiply(q, about(order[i], angles[..., i]))
+    return q
+
+
+def to_euler(q: Array, order: str) -> Array:
+    """Quaternion (..., 4) to Euler angles (..., 3) in the order of `order`, each of the twelve.
+
+    The first and last angle lie within pi, the middle one within pi/2 (or 0 to pi when the first axis
+    returns as the last). In gimbal lock the last angle is zero.
+    Source: Bernardes and Viollet, Quaternion to Euler angles conversion, 2022.
+    """
+    xp = array_namespace(q)
+    # The published formula is for turns about fixed axes: the same angles, read backwards.
+    i, j, k = (AXES.index(axis) for axis in reversed(order.upper()))
+    proper = i == k
+    if proper:
+        k = 3 - i - j
+    sign = float((i - j) * (j - k) * (k - i) // 2)
+    w, vi, vj, vk = q[..., 0], q[..., 1 + i], q[..., 1 + j], q[..., 1 + k]
+    if proper:
+        a, b, c, d = w, vi, vj, vk * sign
+    else:
+        a, b, c, d = w - vj, vi + vk * sign, vj + w, vk * sign - vi
+    middle = 2.0 * xp.atan2(xp.sqrt(c * c + d * d), xp.sqrt(a * a + b * b))
+    half_sum, half_difference = xp.atan2(b, a), xp.atan2(d, c)
+    at_zero, at_pi = xp.abs(middle) < 1e-7, xp.abs(middle - math.pi) < 1e-7
+    zero = xp.zeros_like(middle)
+    last = xp.where(at_zero | at_pi, zero, half_sum - half_difference)
+    first = half_sum + half_difference
+    first = xp.where(at_zero, 2.0 * half_sum, xp.where(at_pi, 2.0 * half_difference, first))
+    if not proper:
+        first = first * sign
+        middle = middle - 0.5 * math.pi
+    angles = xp.stack([first, middle, last], axis=-1)
+    outer = angles - 2.0 * math.pi * xp.round(angles / (2.0 * math.pi))
+    return outer
+
+
+def between(a: Array, b: Array) -> Array:
+    """The smallest rotation (..., 4) that turns the direction of `a` (..., 3) into that of `b`.
+
+    Opposite directions turn about an axis at right angles; zero vectors give the identity.
+    """
+    xp = array_namespace(a, b)
+    a, b = normalize(a), normalize(b)
+    a, b = xp.broadcast_arrays(a, b)
+    cosine = xp.sum(a * b, axis=-1, keepdims=True)
+    q = xp.concat([1.0 + cosine, cross(a, b)], axis=-1)
+    # Opposite: any axis across `a` will do; take the one away from its largest coordinate.
+    x_small = xp.abs(a[..., :1]) < 0.9
+    unit_x = xp.concat([xp.ones_like(cosine), xp.zeros_like(cosine), xp.zeros_like(cosine)], axis=-1)
+    unit_y = xp.concat([xp.zeros_like(cosine), xp.ones_like(cosine), xp.zeros_like(cosine)], axis=-1)
+    across = normalize(cross(a, xp.where(x_small, unit_x, unit_y)))
+    flip = xp.concat([xp.zeros_like(cosine), across], axis=-1)
+    present = xp.sum(a * a, axis=-1, keepdims=True) * xp.sum(b * b, axis=-1, keepdims=True) > 0.5
+    one = xp.concat([xp.ones_like(cosine), xp.zeros_like(a)], axis=-1)
+    q = xp.where(q[..., :1] > 1e-6, q, flip)
+    return normalize(xp.where(present, q, one))
+
+
+def twist_about(q: Array, axis: Array) -> Array:
+    """The part of `q` (..., 4) that turns about the unit vectors `axis` (..., 3).
+
+    ``q == multiply(swing, twist)``, where the swing moves `axis` the short way.
+    """
+    xp = array_namespace(q, axis)
+    along = xp.sum(q[..., 1:] * axis, axis=-1, keepdims=True)
+    twist = xp.concat([q[..., :1], along * axis], axis=-1)
+    length = xp.sum(twist * twist, axis=-1, keepdims=True)
+    one = xp.concat([xp.ones_like(along), xp.zeros_like(twist[..., 1:])], axis=-1)
+    return normalize(xp.where(length > 1e-12, twist, one))
+
+
+def continuous(q: Array) -> Array:
+    """The same rotations (frames, ..., 4) with signs chosen so that neighbouring frames do not flip."""
+    xp = array_namespace(q)
+    dots = xp.sum(q[1:] * q[:-1], axis=-1)
+    steps = xp.where(dots < 0, -xp.ones_like(dots), xp.ones_like(dots))
+    signs = xp.cumulative_prod(steps, axis=0) if hasattr(xp, "cumulative_prod") else xp.cumprod(steps, 0)
+    return xp.concat([q[:1], q[1:] * signs[..., None]], axis=0)

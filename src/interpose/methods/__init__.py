@@ -1,0 +1,1 @@
+"""Everything that can complete a clip, behind one small protocol."""

@@ -1,0 +1,45 @@
+"""The protocol of a method, and the one place where a clip is completed.
+
+A method sees a clip in which unobserved values are already wiped (replaced by the linear completion), so
+that nothing can leak, and returns its raw completion. `complete` then enforces the guarantees.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.observation import Gap, Observation
+
+
+@dataclass(frozen=True)
+class Raw:
+    """What a method itself says, before the guarantees are enforced.
+
+    Attributes:
+        clip: the completion on the clip's own skeleton.
+        positions: (F, J, 3) global joint positions for methods that speak positions, on the joints in
+            `joints`; None for methods that speak rotations.
+        joints: indices of the joints that `positions` speaks of.
+        notes: what a report should say (drift of the root trajectory, model, ...).
+    """
+
+    clip: Clip
+    positions: np.ndarray | None = None
+    joints: tuple[int, ...] = ()
+    notes: dict[str, Any] = field(default_factory=dict)
+
+
+class Method(Protocol):
+    """Something that completes a clip."""
+
+    name: str
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        """Why this method cannot fill this gap of this clip, or None if it can."""
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        """Complete the clip: all values, at every frame. Unobserved values of `clip` carry no information."""

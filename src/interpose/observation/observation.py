@@ -1,0 +1,187 @@
+"""Saying what is observed, beside the clip and never inside it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Frames start to stop - 1 in which something is missing.
+
+    `joints` names the joints whose *local rotations* are unknown; None means the whole pose and the
+    translation of the root.
+    """
+
+    start: int
+    stop: int
+    joints: tuple[str, ...] | None = None
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+    def __str__(self) -> str:
+        return f"{self.start}:{self.stop}" + (f" {','.join(self.joints)}" if self.joints else "")
+
+    @classmethod
+    def parse(cls, text: str, joints: tuple[str, ...] | None = None) -> Gap:
+        """A gap from "120:160", frames 120 to 159. Raises RequestError for anything else."""
+        start, colon, stop = text.strip().partition(":")
+        try:
+            if not colon:
+                raise ValueError
+            return cls(int(start), int(stop), joints)
+        except ValueError:
+            raise RequestError(
+                f"cannot read the gap {text!r}",
+                "a gap is a range of frames START:STOP, and STOP is the first frame after it",
+                "Write --gap 120:160 for the frames 120 to 159.",
+            ) from None
+
+    def check(self, frames: int) -> Gap:
+        """Itself, or RequestError when the range is backwards, empty or outside a clip of `frames` frames."""
+        fix = f"The clip has frames 0 to {frames - 1}; write START:STOP with 0 <= START < STOP <= {frames}."
+        if self.stop <= self.start:
+            raise RequestError(f"the gap {self.start}:{self.stop} is empty", "it stops before it starts", fix)
+        if self.start < 0 or self.stop > frames:
+            raise RequestError(
+                f"the gap {self.start}:{self.stop} reaches outside the clip", f"it has {frames} frames", fix
+            )
+        return self
+
+
+@dataclass(frozen=True)
+class Pin:
+    """A known *global* position and/or orientation of a joint at some frames.
+
+    Attributes:
+        joint: its name.
+        frames: (n,) frame numbers.
+        position: (n, 3) metres, or None.
+        orientation: (n, 4) global quaternions, or None.
+        tolerance: metres by which the joint may miss.
+    """
+
+    joint: str
+    frames: np.ndarray
+    position: np.ndarray | None = None
+    orientation: np.ndarray | None = None
+    tolerance: float = 0.001
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Which values of a clip are known.
+
+    Attributes:
+        rotation: (F, J) True where the local rotation is known.
+        translation: (F, J) True where the local translation is known (the root's is a column of it;
+            joints without animated translation are always known).
+        trust: (F, J) 0 to 1, how far an observed value is believed (below 1 for denoising only).
+        pins: known global positions.
+    """
+
+    rotation: np.ndarray
+    translation: np.ndarray
+    trust: np.ndarray = None  # type: ignore[assignment]
+    pins: tuple[Pin, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        fill = object.__setattr__
+        fill(self, "rotation", np.asarray(self.rotation, bool))
+        fill(self, "translation", np.asarray(self.translation, bool))
+        if self.trust is None:
+            fill(self, "trust", np.ones(self.rotation.shape))
+        if not self.rotation.shape == self.translation.shape == np.shape(self.trust):
+            raise RequestError("the observation does not fit", "its arrays must all be (frames, joints)")
+
+    @classmethod
+    def full(cls, clip: Clip) -> Observation:
+        """Everything is known."""
+        shape = clip.rotation.shape[:2]
+        return cls(np.ones(shape, bool), np.ones(shape, bool))
+
+    @classmethod
+    def from_gaps(cls, clip: Clip, gaps: Iterable[Gap]) -> Observation:
+        """Everything is known but the gaps. Raises RequestError for ranges or joints that are not there."""
+        seen = cls.full(clip)
+        for gap in gaps:
+            gap.check(len(clip))
+            frames = slice(gap.start, gap.stop)
+            if gap.joints is None:
+                seen.rotation[frames] = False
+                seen.translation[frames, list(clip.translated)] = False
+            else:
+                for name in gap.joints:
+                    seen.rotation[frames, clip.skeleton.index(name)] = False
+        return seen
+
+    @classmethod
+    def from_nan(
+        cls, skeleton: Skeleton, rotation: np.ndarray, translation: np.ndarray, fps: float, translated: tuple = ()
+    ) -> tuple[Clip, Observation]:
+        """A finite clip and its observation from arrays in which NaN marks missing values.
+
+        rotation: (F, J, 4); translation: (F, K, 3) as in Clip.
+        """
+        translated = translated or skeleton.roots
+        rotation, translation = np.array(rotation, float), np.array(translation, float)
+        known = np.isfinite(rotation).all(axis=-1)
+        moved = np.ones(known.shape, bool)
+        moved[:, list(translated)] = np.isfinite(translation).all(axis=-1)
+        rotation[~known] = [1, 0, 0, 0]
+        translation[~moved[:, list(translated)]] = 0
+        return Clip(skeleton, rotation, translation, fps, translated), cls(known, moved)
+
+    @property
+    def complete(self) -> bool:
+        return bool(self.rotation.all() and self.translation.all())
+
+    @property
+    def frames(self) -> np.ndarray:
+        """(F,) True where every value of the frame is known."""
+        return self.rotation.all(axis=1) & self.translation.all(axis=1)
+
+    def positions(self, skeleton: Skeleton) -> np.ndarray:
+        """(F, J) True where a joint's *global position* follows from what is known.
+
+        It needs the rotations of all joints above it and the translations from the root down to it.
+        """
+        known = self.translation.copy()
+        for joint, parent in enumerate(skeleton.parents):
+            if parent >= 0:
+                known[:, joint] &= known[:, parent] & self.rotation[:, parent]
+        return known
+
+    def gaps(self, skeleton: Skeleton) -> list[Gap]:
+        """Runs of frames in which the same values are missing, in order of time."""
+        found: list[Gap] = []
+        missing = ~(self.rotation & self.translation)
+        if not missing.any():
+            return found
+        change = np.flatnonzero((missing[1:] != missing[:-1]).any(axis=1)) + 1
+        edges = [0, *change.tolist(), len(missing)]
+        for start, stop in zip(edges, edges[1:]):
+            gone = missing[start]
+            if not gone.any():
+                continue
+            everything = (~self.rotation[start]).all()
+            names = None if everything else tuple(skeleton.names[j] for j in np.flatnonzero(gone))
+            found.append(Gap(start, stop, names))
+        return found
+
+    def slice(self, start: int, stop: int) -> Observation:
+        """The observation of frames start to stop - 1 (pins are left out)."""
+        return replace(
+            self,
+            rotation=self.rotation[start:stop],
+            translation=self.translation[start:stop],
+            trust=self.trust[start:stop],
+            pins=(),
+        )
