@@ -1,0 +1,177 @@
+"""Values between samples: linear and smooth interpolation in time, and resampling of clips."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from array_api_compat import array_namespace
+
+from interpose.errors import RequestError
+from interpose.geometry import rotations
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+
+Array = Any
+
+
+def _around(xp: Any, frames: int, times: Array) -> tuple[Array, Array, Array]:
+    """The samples before and after each time (n,), and how far it lies between them, 0 to 1."""
+    times = xp.clip(times, 0, frames - 1)
+    before = xp.clip(xp.astype(xp.floor(times), xp.int64), 0, max(frames - 2, 0))
+    after = xp.clip(before + 1, 0, frames - 1)
+    return before, after, times - xp.astype(before, times.dtype)
+
+
+def _column(t: Array, like: Array) -> Array:
+    """`t` (n,) with as many trailing axes of length one as broadcast against `like` (n, ..., d) without d."""
+    return t.reshape((-1,) + (1,) * (like.ndim - 2))
+
+
+def sample(values: Array, times: Array) -> Array:
+    """Linear interpolation of `values` (F, ..., d) at fractional frames `times` (n,): (n, ..., d).
+
+    Times outside 0..F-1 take the first or last value.
+    """
+    xp = array_namespace(values, times)
+    before, after, t = _around(xp, values.shape[0], times)
+    t = xp.astype(_column(t, values), values.dtype)[..., None]
+    # Weights on both ends: at t = 0 the sample itself comes back, bit for bit.
+    return (1 - t) * values[before] + t * values[after]
+
+
+def sample_rotations(q: Array, times: Array) -> Array:
+    """SLERP of quaternions (F, ..., 4) at fractional frames `times` (n,): (n, ..., 4)."""
+    xp = array_namespace(q, times)
+    before, after, t = _around(xp, q.shape[0], times)
+    t = xp.astype(_column(t, q), q.dtype)
+    return rotations.slerp(q[before], q[after], t)
+
+
+def fade_out(t: Array, length: Array) -> Array:
+    """How far a start velocity of one carries when it fades out within `length`: t (1 - t / length)^2.
+
+    Zero at t = 0 with slope 1, zero with slope 0 from t = `length` on: the tangent term of the cubic Hermite
+    basis. Both arguments broadcast and are in the same unit (frames).
+    """
+    left = 1.0 - t / length
+    left = 0.5 * (left + abs(left))
+    return t * left * left
+
+
+def _hermite_terms(t: Array, length: Array, reach: float | None) -> tuple[Array, Array, Array]:
+    """Share of the end value, and what a velocity of one at the start and at the end adds: (..., 1) each."""
+    within = length if reach is None else 0.5 * (length + reach - abs(length - reach))
+    terms = t / length, fade_out(t, within), -fade_out(length - t, within)
+    return terms[0][..., None], terms[1][..., None], terms[2][..., None]
+
+
+def hermite(
+    a: Array, b: Array, va: Array, vb: Array, t: Array, length: Array, reach: float | None = None
+) -> Array:
+    """Cubic Hermite interpolation of positions, written as a straight line plus what the velocities add.
+
+    Args:
+        a, b: (..., d) values at time 0 and at time `length`.
+        va, vb: (..., d) velocities there, in units a frame.
+        t: (...) time in frames, 0 to `length`.
+        length: (...) frames from `a` to `b`, above zero.
+        reach: frames within which an end velocity turns into that of the straight line. None, or more than
+            `length`, is the ordinary cubic; less keeps long spans from overshooting. C1 in either case.
+    """
+    share, start, stop = _hermite_terms(t, length, reach)
+    line = (b - a) / length[..., None]
+    return (1 - share) * a + share * b + start * (va - line) + stop * (vb - line)
+
+
+def hermite_rotations(
+    a: Array, b: Array, va: Array, vb: Array, t: Array, length: Array, reach: float | None = None
+) -> Array:
+    """The same for rotations: SLERP, turned by what the end velocities add to its constant velocity.
+
+    Args:
+        a, b: (..., 4) rotations at time 0 and at time `length`; the short way is taken.
+        va, vb: (..., 3) angular velocities there in radians a frame, in the axes of the turning body: those
+            of log(conjugate(q[f]) q[f + 1]).
+        t, length, reach: as in `hermite`.
+
+    The correction is added in the body's axes, so that turning the whole input turns the result. At both
+    ends it is zero, and its slope makes up exactly for the difference to `va` and `vb`; played backwards it
+    is the interpolation of the reversed input.
+    """
+    share, start, stop = _hermite_terms(t, length, reach)
+    way = rotations.log(rotations.multiply(rotations.conjugate(a), b))
+    line = way / length[..., None]
+    base = rotations.multiply(a, rotations.exp(share * way))
+    extra = rotations.exp(start * (va - line) + stop * (vb - line))
+    return rotations.normalize(rotations.multiply(base, extra))
+
+
+def steps(q: Array) -> Array:
+    """The turn from each frame to the next, (F, ..., 4) to rotation vectors (F - 1, ..., 3) in body axes."""
+    return rotations.log(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
+
+
+def _velocities(xp: Any, differences: Array) -> Array:
+    """Velocities at F samples from the F - 1 differences between them: their mean on both sides."""
+    return 0.5 * (
+        xp.concat([differences[:1], differences], axis=0) + xp.concat([differences, differences[-1:]], axis=0)
+    )
+
+
+def sample_smooth(values: Array, times: Array) -> Array:
+    """C1 interpolation of `values` (F, ..., d) at fractional frames `times` (n,), through every sample.
+
+    Cubic Hermite with central differences (Catmull and Rom 1974).
+    """
+    xp = array_namespace(values, times)
+    if values.shape[0] < 3:
+        return sample(values, times)
+    v = _velocities(xp, values[1:] - values[:-1])
+    before, after, t = _around(xp, values.shape[0], times)
+    t = xp.astype(_column(t, values), values.dtype)
+    return hermite(values[before], values[after], v[before], v[after], t, xp.ones_like(t))
+
+
+def sample_rotations_smooth(q: Array, times: Array) -> Array:
+    """C1 interpolation of quaternions (F, ..., 4) at fractional frames `times` (n,), through every sample."""
+    xp = array_namespace(q, times)
+    if q.shape[0] < 3:
+        return sample_rotations(q, times)
+    v = _velocities(xp, steps(q))
+    before, after, t = _around(xp, q.shape[0], times)
+    t = xp.astype(_column(t, q), q.dtype)
+    return hermite_rotations(q[before], q[after], v[before], v[after], t, xp.ones_like(t))
+
+
+def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
+    """The clip at another frame rate.
+
+    The first frame stays the first, and the last sample is the last one that does not lie after the old
+    last frame: (F - 1) / fps seconds apart when the rates divide. Rotations are interpolated by SLERP and
+    translations linearly, or both with continuous velocities (`smooth`). Frames that fall on old ones are
+    those, unchanged. The file's layout is dropped: it belongs to the old frames.
+
+    Raises RequestError when `fps` is not above zero.
+    """
+    if not (np.isfinite(fps) and fps > 0):
+        raise RequestError("cannot resample the clip", f"a frame rate must be above zero, got {fps}")
+    if not len(clip):
+        return replace(clip, fps=fps, source=None)
+    # Files round the frame time (0.033333 s): rates that are that close to a simple ratio mean it, or else
+    # frames that belong together would drift apart. 29.97 and 30 are ten times as far from each other.
+    step = clip.fps / fps
+    simple = float(Fraction(step).limit_denominator(100))
+    step = simple if abs(simple - step) < 1e-4 * step else step
+    times = np.arange(int(np.floor((len(clip) - 1) / step + 1e-6)) + 1) * step
+    nearest = np.round(times)
+    times = np.where(abs(times - nearest) < 1e-6, nearest, times)
+    turn, move = (sample_rotations_smooth, sample_smooth) if smooth else (sample_rotations, sample)
+    rotation, translation = turn(clip.rotation, times), move(clip.translation, times)
+    new = np.flatnonzero(times == nearest)
+    old = nearest[new].astype(int)
+    rotation[new], translation[new] = clip.rotation[old], clip.translation[old]
+    return replace(clip, rotation=rotation, translation=translation, fps=fps, source=None)
