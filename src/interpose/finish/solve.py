@@ -1,0 +1,262 @@
+"""From joint positions to the rotations of a skeleton: aim from the root outward, then refine.
+
+Positions tell where bones point. They do not tell a bone's twist about itself, nor anything below the last
+known joint: there the rotations that the clip already has (a classical completion) are kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.geometry import kinematics, rotations
+from interpose.observation import Observation
+from interpose.skeletons import JOINTS, find_mapping
+
+# Bones shorter than this (metres) point nowhere: CMU's hip joints, lower back and collars have no length.
+NO_LENGTH = 0.01
+# How strongly a fit is pulled towards the pose it starts from, and how strongly bones count that reach over a
+# joint without length: only what the bones at the joint itself leave open should follow either.
+PULL, FAR = 1e-4, 1e-3
+# Sine of the bend below which a knee or elbow tells nothing about the twist above it, and from which it tells all.
+STRAIGHT, BENT = 0.1, 0.35
+# Gauss-Newton: steps, frames at once, and the damping in square metres (a bone's length squared is about 0.1).
+STEPS, BLOCK, DAMPING = 3, 512, 2e-3
+
+
+def solve(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
+    """Rotations with which forward kinematics comes as near to `positions` as the clip's own bones allow.
+
+    Args:
+        clip: (F) frames whose unobserved values are a classical completion.
+        observation: only what is unobserved here may move.
+        joints: indices of the n joints whose positions are known, in any order.
+        positions: (F, n, 3) global positions in metres.
+
+    Returns:
+        The clip with unobserved rotations of joints above a known one, and the translation that carries the
+        topmost known joint, replaced. Each frame is solved for itself, by steps that are smooth in the
+        positions, so that smooth positions give smooth rotations.
+    """
+    target = dict(zip(joints, np.moveaxis(np.asarray(positions, float), 1, 0)))
+    clip = _carry(clip, observation, target)
+    clip = _aim(clip, observation, target)
+    parts = [
+        _refine(clip.slice(i, i + BLOCK), observation.slice(i, i + BLOCK), joints, positions[i : i + BLOCK])
+        for i in range(0, len(clip), BLOCK)
+    ]
+    if not parts:
+        return clip
+    return clip.with_motion(
+        np.concatenate([part.rotation for part in parts]), np.concatenate([part.translation for part in parts])
+    )
+
+
+def _carriers(skeleton: Skeleton, translated: tuple[int, ...], known: Collection[int]) -> dict[int, list[int]]:
+    """Which animated translation carries which topmost known joints: {translated joint: [known joints]}."""
+    carried: dict[int, list[int]] = {}
+    for joint in sorted(known):
+        above = skeleton.ancestors(joint)
+        if not any(a in known for a in above):
+            carrier = next((a for a in (joint, *above) if a in translated), None)
+            if carrier is not None:
+                carried.setdefault(carrier, []).append(joint)
+    return carried
+
+
+def _carry(clip: Clip, observation: Observation, target: dict[int, np.ndarray]) -> Clip:
+    """Shift the root (or the hips below it) so that the topmost known joint lies where it should."""
+    skeleton, translation = clip.skeleton, clip.translation.copy()
+    turned, placed = clip.kinematics()
+    for carrier, joints in _carriers(skeleton, clip.translated, target).items():
+        shift = np.mean([target[j] - placed[:, j] for j in joints], axis=0)
+        parent = skeleton.parents[carrier]
+        if parent >= 0:
+            shift = rotations.rotate(rotations.conjugate(turned[:, parent]), shift)
+        free = ~observation.translation[:, carrier, None]
+        translation[:, clip.translated.index(carrier)] += np.where(
+            free, shift / skeleton.scale_above[carrier], 0.0
+        )
+    return clip.with_motion(clip.rotation, translation)
+
+
+def _aims(skeleton: Skeleton, known: Collection[int]) -> dict[int, list[tuple[int, float]]]:
+    """For each known joint the known joints it aims at, with weights: the next ones below it.
+
+    Where the next one lies in the same place, the ones after it are aimed at too, but count only FAR.
+    """
+    bones = skeleton.rest_translation * skeleton.scale_above[:, None]
+    _, placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)
+    nearest = {j: next((a for a in skeleton.ancestors(j) if a in known), None) for j in known}
+    aims: dict[int, list[tuple[int, float]]] = {j: [] for j in sorted(known)}
+
+    def apart(a: int, b: int) -> bool:
+        return float(np.linalg.norm(placed[a] - placed[b])) > NO_LENGTH
+
+    for joint in aims:
+        above, weight = nearest[joint], 1.0
+        while above is not None:
+            if apart(joint, above):
+                aims[above].append((joint, weight))
+            over = nearest[above]
+            if over is None or apart(above, over):
+                break
+            above, weight = over, FAR
+    return aims
+
+
+def _limbs(skeleton: Skeleton, known: Collection[int]) -> dict[int, tuple[int, int]]:
+    """{thigh: (knee, ankle), upper arm: (elbow, wrist)}, where the skeleton has names and all are known."""
+    found = dict(zip(JOINTS, find_mapping(skeleton).joints))
+    limbs = {}
+    for side in ("Left", "Right"):
+        for names in (("UpLeg", "Leg", "Foot"), ("Arm", "ForeArm", "Hand")):
+            chain = [found[side + name] for name in names]
+            if all(joint in known for joint in chain):
+                limbs[chain[0]] = (chain[1], chain[2])
+    return limbs  # type: ignore[return-value]
+
+
+def _aim(clip: Clip, observation: Observation, target: dict[int, np.ndarray]) -> Clip:
+    """Turn each known joint, parents first, so that the known joints next below it come to their positions.
+
+    Each aims from where forward kinematics has put it by then, so that errors do not pile up on the way.
+    """
+    skeleton, parents = clip.skeleton, clip.skeleton.parents
+    aims, limbs = _aims(skeleton, target), _limbs(skeleton, target)
+    rotation, bones = clip.rotation.copy(), clip.local_translation()
+    turned, placed = np.empty_like(rotation), np.empty_like(bones)
+
+    def down(start: int, stop: int) -> np.ndarray:
+        """(F, 3) where `stop` lies from `start`, in the axes of `start`, by the rotations as they are."""
+        vector, joint = bones[:, stop], parents[stop]
+        while joint != start:
+            vector = bones[:, joint] + rotations.rotate(rotation[:, joint], vector)
+            joint = parents[joint]
+        return vector
+
+    for joint, parent in enumerate(parents):
+        if parent < 0:
+            turned[:, joint], placed[:, joint] = rotation[:, joint], bones[:, joint]
+        else:
+            turned[:, joint] = rotations.multiply(turned[:, parent], rotation[:, joint])
+            placed[:, joint] = placed[:, parent] + rotations.rotate(turned[:, parent], bones[:, joint])
+        free = ~observation.rotation[:, joint]
+        if not aims.get(joint) or not free.any():
+            continue
+        reach = [rotations.rotate(turned[:, joint], down(joint, below)) for below, _ in aims[joint]]
+        wanted = [target[below] - placed[:, joint] for below, _ in aims[joint]]
+        if len(reach) == 1:
+            turn = rotations.between(reach[0], wanted[0])
+        else:
+            turn = _fit(np.stack(reach, 1), np.stack(wanted, 1), np.array([w for _, w in aims[joint]]))
+        if joint in limbs and aims[joint][0][0] == limbs[joint][0]:
+            knee, ankle = limbs[joint]
+            aimed = rotations.multiply(turn, turned[:, joint])
+            at_knee = placed[:, joint] + rotations.rotate(turn, reach[0])
+            shin = rotations.rotate(aimed, down(joint, ankle)) - (at_knee - placed[:, joint])
+            twist = _twist(at_knee - placed[:, joint], shin, target[ankle] - at_knee)
+            turn = rotations.multiply(twist, turn)
+        done = rotations.normalize(rotations.multiply(turn, turned[:, joint]))
+        turned[:, joint] = np.where(free[:, None], done, turned[:, joint])
+        local = done if parent < 0 else rotations.multiply(rotations.conjugate(turned[:, parent]), done)
+        rotation[:, joint] = np.where(free[:, None], local, rotation[:, joint])
+    return clip.with_motion(rotation, clip.translation)
+
+
+def _fit(reach: np.ndarray, wanted: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The rotation (F, 4) that brings vectors (F, n, 3) nearest to `wanted`, pulled towards no rotation.
+
+    Source: Kabsch 1976. The pull decides what the vectors leave open; a second round takes its bias away.
+    """
+    total = np.tile([1.0, 0, 0, 0], (len(reach), 1))
+    for _ in range(2):
+        size = (weights[:, None] * reach**2).sum(axis=(1, 2))
+        matrix = np.einsum("n,fni,fnj->fij", weights, wanted, reach) + PULL * size[:, None, None] * np.eye(3)
+        u, _, vt = np.linalg.svd(matrix)
+        u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
+        turn = rotations.from_matrix(u @ vt)
+        reach = rotations.rotate(turn[:, None], reach)
+        total = rotations.multiply(turn, total)
+    return total
+
+
+def _twist(axis: np.ndarray, bone: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The turn (F, 4) about a thigh that brings its shin to the side where `wanted` bends (all (F, 3)).
+
+    It fades out as either is straight, where there is no side, and as the sides become opposite, where the
+    two ways round are equally long.
+    """
+    axis = rotations.normalize(axis)
+    across = [v - (v * axis).sum(-1, keepdims=True) * axis for v in (bone, wanted)]
+    sines = [
+        np.linalg.norm(a, axis=-1) / np.maximum(np.linalg.norm(v, axis=-1), 1e-9)
+        for a, v in zip(across, (bone, wanted))
+    ]
+    bend = np.minimum(*sines)
+    angle = np.arctan2((rotations.cross(*across) * axis).sum(-1), (across[0] * across[1]).sum(-1))
+    share = ramp((bend - STRAIGHT) / (BENT - STRAIGHT)) * ramp((np.pi - np.abs(angle)) / (np.pi / 4))
+    return rotations.exp((share * angle)[:, None] * axis)
+
+
+def ramp(x: np.ndarray) -> np.ndarray:
+    """A smooth step: 0 up to x = 0, 1 from x = 1, with zero slope at both."""
+    x = np.clip(x, 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def _refine(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
+    """A few damped Gauss-Newton steps on all joint angles at once.
+
+    Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
+    this shares it out. Damping keeps what positions do not tell.
+    """
+    skeleton = clip.skeleton
+    movable = [j for j in sorted(joints) if any(j in skeleton.ancestors(k) for k in joints)]
+    carriers = list(_carriers(skeleton, clip.translated, set(joints)))
+    above = np.array([[float(j in skeleton.ancestors(k)) for j in movable] for k in joints])
+    shifted = np.array([[float(c == k or c in skeleton.ancestors(k)) for c in carriers] for k in joints])
+    free = np.repeat(~observation.rotation[:, movable], 3, axis=1)
+    free_shift = np.repeat(~observation.translation[:, carriers], 3, axis=1)
+    free = np.concatenate([free, free_shift], axis=1).astype(float)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    slots = [clip.translated.index(c) for c in carriers]
+
+    for _ in range(STEPS):
+        turned, placed = clip.with_motion(rotation, translation).kinematics()
+        lever = (placed[:, joints, None] - placed[:, None, movable]) * above[..., None]
+        x, y, z, o = lever[..., 0], lever[..., 1], lever[..., 2], np.zeros_like(lever[..., 0])
+        # A small turn d about the axes of the world moves a point by d x lever: rows of that matrix.
+        by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], -2)
+        by_turn = np.moveaxis(by_turn, 2, 3).reshape(len(clip), 3 * len(joints), 3 * len(movable))
+        by_shift = np.einsum("kc,ab->kacb", shifted, np.eye(3)).reshape(3 * len(joints), 3 * len(carriers))
+        jacobian = np.concatenate([by_turn, np.broadcast_to(by_shift, (len(clip), *by_shift.shape))], axis=2)
+        jacobian *= free[:, None, :]
+        miss = (positions - placed[:, joints]).reshape(len(clip), -1)
+        transposed = np.swapaxes(jacobian, 1, 2)
+        normal = transposed @ jacobian + DAMPING * np.eye(jacobian.shape[2])
+        step = np.linalg.solve(normal, transposed @ miss[..., None])[..., 0] * free
+        turn, shift = step[:, : 3 * len(movable)], step[:, 3 * len(movable) :]
+        # A turn d of the world's axes before a joint's own rotation is a turn in the axes of its parent.
+        for i, joint in enumerate(movable):
+            parent, d = skeleton.parents[joint], turn[:, 3 * i : 3 * i + 3]
+            if parent >= 0:
+                d = rotations.rotate(rotations.conjugate(turned[:, parent]), d)
+            rotation[:, joint] = np.where(
+                observation.rotation[:, joint, None],
+                rotation[:, joint],
+                rotations.normalize(rotations.multiply(rotations.exp(d), rotation[:, joint])),
+            )
+        for i, (carrier, slot) in enumerate(zip(carriers, slots)):
+            parent, d = skeleton.parents[carrier], shift[:, 3 * i : 3 * i + 3]
+            if parent >= 0:
+                d = rotations.rotate(rotations.conjugate(turned[:, parent]), d)
+            translation[:, slot] += d / skeleton.scale_above[carrier]
+    return clip.with_motion(rotation, translation)
+
+
+def solve_error(clip: Clip, joints: tuple[int, ...], positions: np.ndarray) -> np.ndarray:
+    """(F,) mean distance in metres between forward kinematics and the positions (F, n, 3) of `joints`."""
+    return np.linalg.norm(clip.positions()[:, list(joints)] - positions, axis=-1).mean(axis=1)
