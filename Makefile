@@ -2,6 +2,7 @@
 
 SHELL   := /bin/sh
 PYTHON  ?=
+PYTHONS := $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python)
 CORE    := .venv
 TEST    := .venv-test
 PIP     := -m pip --disable-pip-version-check --quiet
@@ -35,14 +36,14 @@ clean: ## remove environments, caches and build results
 
 # The first Python that is new enough and can make environments; PYTHON=... chooses another.
 define MAKE_VENV
-@for python in $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python); do \
+@for python in $(PYTHONS); do \
     if $$python -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
         echo "Setting up $(@D) with $$($$python --version) ..."; \
         rm -rf $(@D) && exec $$python -m venv $(@D); \
     fi; \
 done; \
 echo "No usable Python was found." >&2; \
-echo "interpose needs Python 3.11 or later, with its venv module (tried: $(or $(PYTHON),python3, python3.11 to python3.14, python))." >&2; \
+echo "interpose needs Python 3.11 or later, with its venv module (tried: $(PYTHONS))." >&2; \
 echo "Install one (on Debian and Ubuntu also the package python3-venv), or name yours: make $(MAKECMDGOALS) PYTHON=/path/to/python3" >&2; \
 exit 1
 endef
