@@ -1,0 +1,54 @@
+"""Methods by name. Nothing is imported before it is asked for, so that listing names costs nothing."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+
+from interpose.errors import RequestError, unknown
+from interpose.methods.protocol import Method
+
+# name: (module, class); the class is called without arguments.
+METHODS: dict[str, tuple[str, str]] = {
+    "zero-velocity": ("interpose.methods.classical", "ZeroVelocity"),
+    "linear": ("interpose.methods.classical", "Linear"),
+    "spline": ("interpose.methods.classical", "Spline"),
+}
+
+# The entry-point group in which other packages offer methods: name = "package.module:Class".
+GROUP = "interpose.methods"
+
+
+def _offered() -> dict[str, EntryPoint]:
+    """Methods of other packages; our own names cannot be taken over."""
+    return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in METHODS}
+
+
+def names() -> tuple[str, ...]:
+    """The names of all methods, our own first."""
+    return (*METHODS, *sorted(_offered()))
+
+
+@cache
+def get(name: str) -> Method:
+    """The method of that name, always the same object.
+
+    Raises RequestError for unknown names (with the list of known ones), and for a method of another package
+    that cannot be loaded.
+    """
+    if name in METHODS:
+        module, kind = METHODS[name]
+        return getattr(import_module(module), kind)()
+    offered = _offered()
+    if name not in offered:
+        raise unknown("method", name, names())
+    entry = offered[name]
+    try:
+        return entry.load()()
+    except Exception as error:
+        raise RequestError(
+            f"the method {name} cannot be loaded",
+            f"{entry.value} of another package fails with: {error}",
+            "Repair or remove that package, or choose another method.",
+        ) from error

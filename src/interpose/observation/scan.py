@@ -1,0 +1,182 @@
+"""Finding what is missing in a clip that does not say so: frozen runs, and rest poses at the ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.geometry import rotations
+from interpose.observation.observation import Gap, Observation
+
+# A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
+# trembles by 1e-4 and more; files keep about 1e-8.
+STILL = 1e-6
+# A joint that turns less than this in the whole clip (radians) has no data at all, like most fingers.
+LIFELESS = 1e-3
+# Frozen runs shorter than this many seconds are as good as noise; at least 3 frames.
+SHORTEST = 0.1
+# A joint that stands still without a jump at either end may be at the limit of a hinge: only after a second.
+SHORTEST_WITHOUT_JUMP = 1.0
+# The least jump, in radians and metres.
+JUMP_TURN, JUMP_WAY = 0.01, 0.02
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something suspicious in a clip.
+
+    Attributes:
+        kind: "missing", "frozen", "frozen position", "rest pose" or "outlier".
+        joints: the joints concerned, or None for the whole pose.
+        start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
+            the one that was held.
+        note: one line for a person.
+    """
+
+    kind: str
+    joints: tuple[str, ...] | None
+    start: int
+    stop: int
+    note: str = ""
+
+    def __len__(self) -> int:
+        return self.stop - self.start
+
+
+def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
+    """What looks missing, in order of time.
+
+    - "missing": what `observation` says is unknown.
+    - "rest pose" or "outlier": a first or last frame that has nothing to do with its neighbour, as in the
+      BVH files of the CMU library.
+    - "frozen": joints whose local rotation stops changing altogether while it moves elsewhere in the clip,
+      for at least .1 s (and 3 frames) with a jump at one end, or for a second away from the rest pose: a
+      hinge at its limit has no jump, and files write it as their rest pose. When everything that moves stands still at once, the root's position included, it
+      is one finding of the whole pose, jump or not.
+    - "frozen position": the same for a root whose position stands still while the pose does not.
+
+    Joints that never move are not reported.
+    """
+    findings: list[Finding] = []
+    known = observation or Observation.full(clip)
+    for gap in known.gaps(clip.skeleton):
+        findings.append(Finding("missing", gap.joints, gap.start, gap.stop, "no values"))
+    if len(clip) > 2:
+        turned, moved = _steps(clip, known)
+        first, last = 0, len(clip)
+        for frame, step in ((0, 0), (len(clip) - 1, len(turned) - 1)):
+            kind = _outlier(clip, turned, frame, step)
+            if kind:
+                note = (
+                    "the frame has nothing to do with the next" if frame == 0 else "... with the one before"
+                )
+                findings.append(Finding(kind, None, frame, frame + 1, note))
+                first, last = (1, last) if frame == 0 else (first, last - 1)
+        turned, moved = turned[first : last - 1], moved[first : last - 1]
+        findings += _frozen(clip, turned, moved, first)
+    return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
+
+
+def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
+    """The gaps to fill. A frozen position is none: a gap cannot be in the root's position alone."""
+    return [Gap(f.start, f.stop, f.joints) for f in findings if f.kind != "frozen position"]
+
+
+def _steps(clip: Clip, known: Observation) -> tuple[np.ndarray, np.ndarray]:
+    """Change from frame to frame: turns (F - 1, J), and ways (F - 1, R) of roots; NaN where unknown."""
+    roots = list(clip.skeleton.roots)
+    # The chord of two quaternions: as good as the angle for small ones, and quick on long clips.
+    q = rotations.continuous(clip.rotation)
+    turned = 2.0 * np.linalg.norm(np.diff(q, axis=0), axis=-1)
+    moved = np.diff(clip.translation[:, [clip.translated.index(root) for root in roots]], axis=0)
+    moved = np.linalg.norm(moved, axis=-1)
+    turned[~(known.rotation[1:] & known.rotation[:-1])] = np.nan
+    position = known.translation[:, roots]
+    moved[~(position[1:] & position[:-1])] = np.nan
+    return turned, moved
+
+
+def _outlier(clip: Clip, turned: np.ndarray, frame: int, step: int) -> str | None:
+    """What the first or last frame is, given the step between it and its neighbour."""
+    mean = np.nan_to_num(turned).mean(axis=1)
+    others = np.delete(mean, step)
+    if mean[step] < 2 * np.percentile(others, 99) or mean[step] < 10 * np.median(others):
+        return None
+    rest = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[frame]) < 0.01
+    return "rest pose" if rest.mean() > 0.5 else "outlier"
+
+
+@dataclass(frozen=True)
+class Run:
+    """Steps start to stop - 1 are zero; does the step into the run, and the one out of it, jump?"""
+
+    start: int
+    stop: int
+    jumps_in: bool
+    jumps_out: bool
+
+
+def _runs(zero: np.ndarray, steps: np.ndarray, least: float) -> Iterator[Run]:
+    """Runs of True in `zero` (n,). A jump is a step above `least` and three times those next to it."""
+
+    def jumps(near: np.ndarray) -> bool:
+        return len(near) > 1 and bool(near[0] > least and near[0] > 3 * np.nanmax(near[1:], initial=0.0))
+
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], zero, [False]])))
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist()):
+        into, out = steps[max(start - 4, 0) : start][::-1], steps[stop : stop + 4]
+        yield Run(start, stop, jumps(into), jumps(out))
+
+
+def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> list[Finding]:
+    """Frozen runs; the steps are those between the frames `first`, first + 1, ..."""
+    names = clip.skeleton.names
+    shortest = max(3, SHORTEST * clip.fps)
+    with np.errstate(invalid="ignore"):
+        still, stopped = turned < STILL, moved < STILL
+    alive = np.flatnonzero(np.nansum(turned, axis=0) > LIFELESS)
+    walking = np.flatnonzero(np.nansum(moved, axis=0) > LIFELESS)
+    if not len(alive):
+        return []
+    found = []
+
+    def add(kind: str, joints: tuple[str, ...] | None, run: Run) -> None:
+        # Steps start..stop - 1 are zero, so frames start..stop are equal. One of them is good, unless both
+        # ends jump: the first, which was held, or the last where the clip begins with the run.
+        begin = run.start + (0 if run.jumps_in or run.start == 0 else 1)
+        end = run.stop + (0 if run.start == 0 and not run.jumps_out else 1)
+        what = "the position stands" if kind == "frozen position" else "nothing moves"
+        seconds = (run.stop - run.start) / clip.fps
+        found.append(Finding(kind, joints, first + begin, first + end, f"{what} for {seconds:.2f} s"))
+
+    whole = np.asarray(still[:, alive].all(axis=1) & stopped[:, walking].all(axis=1))
+    for run in _runs(whole, turned[:, alive].max(axis=1), JUMP_TURN):
+        if run.stop - run.start >= shortest:
+            add("frozen", None, run)
+
+    together: dict[Run, list[int]] = {}
+    for joint in alive.tolist():
+        for run in _runs(still[:, joint] & ~whole, turned[:, joint], JUMP_TURN):
+            rest = rotations.angle(
+                clip.skeleton.rest_rotation[joint], clip.rotation[first + run.start, joint]
+            )
+            if _suspicious(run, clip.fps, at_limit=bool(rest < LIFELESS)):
+                together.setdefault(run, []).append(joint)
+    for run, joints in together.items():
+        add("frozen", tuple(names[joint] for joint in joints), run)
+    for column in walking.tolist():
+        for run in _runs(stopped[:, column] & ~whole, moved[:, column], JUMP_WAY):
+            if _suspicious(run, clip.fps, at_limit=False):
+                add("frozen position", (names[clip.skeleton.roots[column]],), run)
+    return found
+
+
+def _suspicious(run: Run, fps: float, at_limit: bool) -> bool:
+    """Whether a run of one joint is more than a pause or a hinge at its limit."""
+    length = run.stop - run.start
+    if run.jumps_in or run.jumps_out:
+        return length >= max(3, SHORTEST * fps)
+    return not at_limit and length >= SHORTEST_WITHOUT_JUMP * fps
