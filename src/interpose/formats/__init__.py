@@ -1,0 +1,150 @@
+"""Files: one module or package a format, and the two verbs that choose among them by suffix."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from interpose.clip import Clip
+from interpose.errors import FileError, RequestError
+from interpose.formats import bvh, npz
+
+__all__ = ["FORMATS", "Format", "load", "save"]
+
+
+class Format(NamedTuple):
+    """How a format is read and written, and which options of `load` it takes.
+
+    `read(path, **options) -> Clip`; `write(clip, binary stream) -> notes` on what the format cannot hold.
+    """
+
+    read: Callable[..., Clip]
+    write: Callable[..., tuple[str, ...]]
+    options: tuple[str, ...] = ()
+
+
+FORMATS = {
+    ".bvh": Format(bvh.read, bvh.write, ("unit", "up", "joint_positions")),
+    ".npz": Format(npz.read, npz.write),
+}
+
+
+def load(
+    path: str | Path,
+    unit: float | str | None = None,
+    up: str | None = None,
+    joint_positions: str | None = None,
+) -> Clip:
+    """Read a clip from a file; the suffix says how (.bvh, .npz). Metres and Y up inside.
+
+    Args:
+        path: the file.
+        unit: metres per unit of the file, or m, cm, mm, inch, CMU. Estimated when None.
+        up: the file's up axis, "y" or "z". Estimated when None.
+        joint_positions: "replace" or "add": what position channels do to a joint's rest translation.
+            Estimated when None.
+
+    What was estimated stands in `clip.source` (for BVH a `bvh.BvhSource`; its `describe()` gives lines to
+    print).
+
+    Raises:
+        FileError: the file is missing, unreadable or damaged; the message says what to do.
+        RequestError: the suffix or an option is wrong.
+    """
+    path = Path(path)
+    chosen = _format(path)
+    options: dict[str, Any] = {"unit": unit, "up": up, "joint_positions": joint_positions}
+    options = {name: value for name, value in options.items() if value is not None}
+    for name in options:
+        if name not in chosen.options:
+            raise RequestError(
+                f"{name} does not apply to {path.name}",
+                f"{path.suffix} files say it themselves",
+                "Leave the option out.",
+            )
+    _check_readable(path)
+    try:
+        return chosen.read(path, **options)
+    except OSError as error:
+        raise FileError(f"cannot read {path}", error.strerror or str(error), "Check the file.") from None
+
+
+def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
+    """Write a clip to a file, whole or not at all; the suffix says how (.bvh, .npz).
+
+    A clip that was read from BVH keeps that file's layout and the text of every number that did not change.
+
+    Args:
+        clip: the clip.
+        path: where to; its folder must exist.
+        force: replace an existing file.
+
+    Returns:
+        Notes on what the format cannot hold, usually none.
+
+    Raises:
+        RequestError: the suffix is unknown, the folder is missing, or the file exists and `force` is False.
+        FileError: the file cannot be written.
+    """
+    path = Path(path)
+    chosen = _format(path)
+    _check_free(path, force)
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            with part.open("wb") as stream:
+                notes = chosen.write(clip, stream)
+            _check_free(path, force)
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"cannot write {path}", error.strerror or str(error), "Choose another folder with -o."
+        ) from None
+    return notes
+
+
+def _format(path: Path) -> Format:
+    try:
+        return FORMATS[path.suffix.lower()]
+    except KeyError:
+        raise RequestError(
+            f"unknown file format: {path.name}",
+            f"its suffix is {path.suffix or 'missing'}",
+            f"Supported are {', '.join(FORMATS)}.",
+        ) from None
+
+
+def _check_readable(path: Path) -> None:
+    what = f"cannot read {path}"
+    try:
+        if path.is_file():
+            return
+        if path.is_dir():
+            raise FileError(what, "it is a directory", "Name one file in it.")
+        if path.exists():
+            raise FileError(what, "it is no regular file", "Save it to disk first.")
+        folder = path.parent
+        if not folder.is_dir():
+            raise FileError(what, f"there is no folder {folder}", "Check the spelling.")
+        near = difflib.get_close_matches(path.name, [p.name for p in folder.iterdir()], n=3)
+    except (OSError, ValueError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(what, str(error), "Check the name.") from None
+    hint = f"Did you mean {' or '.join(near)}?" if near else "Check the spelling."
+    raise FileError(what, "there is no such file", hint)
+
+
+def _check_free(path: Path, force: bool) -> None:
+    what = f"cannot write {path}"
+    if path.is_dir():
+        raise RequestError(what, "it is a directory", "Name a file in it.")
+    if not path.parent.is_dir():
+        raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
+    if path.exists() and not force:
+        raise RequestError(what, "the file exists already", "Choose another name with -o, or add --force.")

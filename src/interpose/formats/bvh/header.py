@@ -1,0 +1,245 @@
+"""The upper part of a BVH file: hierarchy, number of frames and frame time.
+
+Source: Meredith and Maddock, Motion Capture File Formats Explained, University of Sheffield, 2001.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from interpose.errors import FileError
+
+HEADER_LIMIT = 4 << 20  # bytes: what comes before the first number of the motion
+JOINT_LIMIT = 2000  # kinematics keep a matrix (joints, joints)
+VALUE_LIMIT = 1e9  # degrees or file units; what is above is damage, and would overflow later
+
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+_CHANNEL = re.compile(r"([XYZ])(position|rotation)\Z", re.IGNORECASE)
+_MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
+_FRAMES = re.compile(rb"\s*Frames[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
+_FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
+
+# Rates that people record and deliver at: a rounded frame time such as 0.033333 means one of these.
+RATES = (
+    *(10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 75, 90, 100),
+    *(120000 / 1001, 120, 125, 144, 150, 180, 200, 240, 250, 300, 360, 400, 480, 500, 600, 1000),
+)
+
+
+@dataclass
+class Node:
+    """One ROOT or JOINT as the file has it, in the file's units and axes.
+
+    Attributes:
+        name: as written; may occur twice in a file.
+        parent: index of the parent, -1 for a ROOT.
+        offset: the three numbers of OFFSET.
+        channels: pairs of kind ("position" or "rotation") and axis ("X", "Y", "Z"), in file order.
+        ends: the offsets of its End Sites.
+    """
+
+    name: str
+    parent: int
+    offset: tuple[float, ...] = ()
+    channels: tuple[tuple[str, str], ...] | None = None
+    ends: list[tuple[float, ...]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Header:
+    """Everything before the first number of the motion.
+
+    Attributes:
+        text: the original bytes.
+        nodes: the joints in file order, parents first.
+        frames: the number behind "Frames:".
+        fps: frames a second; the usual rate that a rounded frame time stands for, else its inverse.
+        frames_at, time_at: where in `text` the number of frames and the frame time stand.
+    """
+
+    text: bytes
+    nodes: tuple[Node, ...]
+    frames: int
+    fps: float
+    frames_at: tuple[int, int]
+    time_at: tuple[int, int]
+
+    @property
+    def channels(self) -> int:
+        """How many numbers a frame has."""
+        return sum(len(node.channels or ()) for node in self.nodes)
+
+
+def line_of(text: bytes, position: int) -> int:
+    """The 1-based number of the line in which the byte `position` stands."""
+    ends = text.count(b"\n", 0, position)
+    return 1 + (ends or text.count(b"\r", 0, position))
+
+
+def parse_header(start: bytes, name: str) -> Header:
+    """The header from the first bytes of a file (at most HEADER_LIMIT of them are looked at).
+
+    Raises FileError, with the line number where there is one, when it is no BVH header.
+    """
+    what = f"cannot read {name} as BVH"
+    start = start[:HEADER_LIMIT]
+    if not start.strip():
+        raise FileError(what, "the file is empty", "Export the clip again.")
+    if b"\0" in start:
+        raise FileError(what, "it is a binary file", "Export the clip as BVH, which is a text format.")
+    hierarchy = start.removeprefix(b"\xef\xbb\xbf").lstrip()
+    if not hierarchy[:9].upper() == b"HIERARCHY":
+        raise FileError(what, "it does not begin with HIERARCHY", "Check that it is a BVH file.")
+    motion = _MOTION.search(start)
+    if motion is None:
+        limit = f" in its first {HEADER_LIMIT >> 20} MiB" if len(start) == HEADER_LIMIT else ""
+        raise FileError(
+            what, f"there is no MOTION line{limit}", "The file is truncated or damaged: export it again."
+        )
+    nodes = _parse_hierarchy(start[: motion.start()], what)
+
+    frames = _FRAMES.match(start, motion.end())
+    if frames is None or not frames[1].isdigit() or len(frames[1]) > 12:
+        line = line_of(start, motion.end()) + 1
+        raise FileError(
+            what, f"line {line}: no number of frames", 'Below MOTION must stand "Frames:" and a number.'
+        )
+    time = _FRAME_TIME.match(start, frames.end())
+    seconds = _number(time[1].decode("latin-1")) if time else None
+    if time is None or seconds is None or not seconds > 0 or not math.isfinite(1 / seconds):
+        line = line_of(start, frames.end()) + 1
+        shown = f"the frame time is {time[1][:40].decode('latin-1')}" if time else "no frame time"
+        raise FileError(
+            what, f"line {line}: {shown}", 'Write "Frame Time:" and the seconds, for example 0.0333333.'
+        )
+    if int(frames[1]) == 0:
+        raise FileError(what, "its motion has no frames (Frames: 0)", "Export the clip with its motion.")
+    return Header(
+        start[: time.end()],
+        tuple(nodes),
+        int(frames[1]),
+        _rate(time[1].decode("latin-1"), seconds),
+        frames.span(1),
+        time.span(1),
+    )
+
+
+def _number(word: str) -> float | None:
+    """A finite number of sensible size, or None."""
+    if not NUMBER.match(word) or len(word) > 64:
+        return None
+    value = float(word)
+    return value if abs(value) <= VALUE_LIMIT else None
+
+
+def _rate(text: str, seconds: float) -> float:
+    """Frames a second: the usual rate within one unit of the last written decimal, else 1 / seconds."""
+    mantissa, _, exponent = text.lower().partition("e")
+    unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
+    near = float(min(RATES, key=lambda rate: abs(1 / rate - seconds)))
+    error = abs(1 / near - seconds)
+    return near if error <= 1.001 * unit and error < 0.02 * seconds else 1 / seconds
+
+
+def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
+    nodes: list[Node] = []
+    # Open blocks: the index of a joint, or None for an End Site. `ahead` waits for its brace.
+    blocks: list[int | None] = []
+    waiting = False
+    ahead: int | None = None
+    in_end = False
+
+    def bad(why: str, fix: str = "The file is damaged: export it again.") -> FileError:
+        return FileError(what, f"line {number}: {why}", fix)
+
+    lines = text.removeprefix(b"\xef\xbb\xbf").splitlines()
+    number = 1
+    for number, line in enumerate(lines, 1):
+        try:
+            decoded = line.decode("utf-8")
+        except UnicodeDecodeError:
+            decoded = line.decode("latin-1")
+        words = decoded.replace("{", " { ").replace("}", " } ").split()
+        while words:
+            key = words.pop(0)
+            word = key.upper()
+            if word == "{":
+                if not waiting:
+                    raise bad("a brace opens where none is expected")
+                blocks.append(None if in_end else ahead)
+                waiting = False
+            elif waiting:
+                raise bad(f'"{{" expected, found {key[:40]!r}')
+            elif word == "}":
+                if not blocks:
+                    raise bad("a brace closes that was never opened")
+                closed = blocks.pop()
+                if closed is not None and not nodes[closed].offset:
+                    raise bad(f"{nodes[closed].name} has no OFFSET")
+                in_end = False
+            elif word in ("ROOT", "JOINT"):
+                if (word == "ROOT") != (not blocks) or in_end:
+                    raise bad(f"{word} stands at the wrong place")
+                brace = words.index("{") if "{" in words else len(words)
+                parent = blocks[-1] if blocks else None
+                ahead = len(nodes)
+                nodes.append(Node(" ".join(words[:brace]) or f"joint{ahead}", -1 if parent is None else parent))
+                if len(nodes) > JOINT_LIMIT:
+                    raise bad(f"more than {JOINT_LIMIT} joints", "interpose reads no larger skeletons.")
+                words, waiting = words[brace:], True
+            elif word == "END":
+                if not blocks or in_end:
+                    raise bad("an End Site stands at the wrong place")
+                words = words[words.index("{") :] if "{" in words else []
+                waiting = in_end = True
+            elif word == "OFFSET":
+                values = [_number(w) for w in words[:3]]
+                if len(values) < 3 or None in values or (len(words) > 3 and words[3] != "}"):
+                    raise bad(f"OFFSET needs three numbers, found {' '.join(words)[:60]!r}")
+                offset = tuple(float(v) for v in values)  # type: ignore[arg-type]
+                if not blocks:
+                    raise bad("OFFSET stands outside of a joint")
+                joint = blocks[-1]
+                if joint is None:
+                    owner = next(b for b in reversed(blocks) if b is not None)
+                    nodes[owner].ends.append(offset)
+                elif nodes[joint].offset:
+                    raise bad(f"{nodes[joint].name} has two OFFSETs")
+                else:
+                    nodes[joint].offset = offset
+                words = words[3:]
+            elif word == "CHANNELS":
+                joint = blocks[-1] if blocks else None
+                if joint is None or nodes[joint].channels is not None:
+                    raise bad("CHANNELS stands at the wrong place")
+                count = int(words[0]) if words and words[0].isdigit() and len(words[0]) < 4 else -1
+                given = words[1 : words.index("}")] if "}" in words else words[1:]
+                if count != len(given):
+                    raise bad(f"CHANNELS says {words[0][:20] if words else 'nothing'}, {len(given)} names follow")
+                found = [_CHANNEL.match(w) for w in given]
+                if not all(found) or len({w.lower() for w in given}) < len(given):
+                    raise bad(
+                        f"unknown or repeated channels: {' '.join(given)[:80]}",
+                        "Channels are Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation.",
+                    )
+                nodes[joint].channels = tuple((m[2].lower(), m[1].upper()) for m in found if m)
+                words = words[1 + count :]
+            elif word == "HIERARCHY" and not nodes:
+                continue
+            else:
+                raise bad(f"cannot understand {key[:40]!r}")
+    if blocks or waiting:
+        raise bad("braces do not balance: the hierarchy ends inside of a joint")
+    if not nodes:
+        raise bad("there is no ROOT")
+    if not any(node.channels for node in nodes):
+        raise bad("no joint has channels")
+    bones = [node.offset for node in nodes if node.parent >= 0]
+    moved = any(kind == "position" for n in nodes if n.parent >= 0 for kind, _ in n.channels or ())
+    if bones and not moved and not np.any(bones):
+        raise FileError(what, "all its bones have length zero", "Export the clip with its skeleton.")
+    return nodes

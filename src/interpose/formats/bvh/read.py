@@ -1,0 +1,237 @@
+"""Reading BVH: estimating what the file does not say, then numbers to a clip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import FileError, RequestError, unknown
+from interpose.formats.bvh.header import Header, Node
+from interpose.formats.bvh.layout import Layout, make_layout
+from interpose.formats.bvh.motion_text import MotionText, read_text
+from interpose.geometry import kinematics
+from interpose.skeletons import JOINTS, Mapping, find_mapping
+
+# Metres. The last is the scale of the CMU data: 1/0.45 inch.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "CMU": 0.0254 / 0.45}
+LEG = 0.45, 1.25  # metres: thigh and shin of a child and of a giant
+USUAL_LEG = 0.85
+BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
+SAMPLE = 101  # frames looked at for estimates
+
+
+@dataclass(frozen=True, eq=False)
+class BvhSource:
+    """What a BVH file has and a clip does not: kept beside the clip so that writing gives the same file.
+
+    Attributes:
+        header: the part above the motion, with its original text.
+        motion: the motion's original text.
+        skeleton: the skeleton as read.
+        layout: which column means what; its `unit` is metres per file unit, its `up` "y" or "z".
+        unit_how, up_how: "given", or how it was estimated.
+        positions: "replace" or "add": what position channels of joints that are not roots do to the OFFSET;
+            "none" when there are none. Roots' replace it, except where "add" was given.
+        positions_how: as `unit_how`.
+    """
+
+    header: Header
+    motion: MotionText
+    skeleton: Skeleton
+    layout: Layout
+    unit_how: str
+    up_how: str
+    positions: str
+    positions_how: str
+
+    @property
+    def unit(self) -> float:
+        """Metres per file unit."""
+        return self.layout.unit
+
+    @property
+    def up(self) -> str:
+        """The file's up axis, "y" or "z"."""
+        return self.layout.up
+
+    @property
+    def fps(self) -> float:
+        return self.header.fps
+
+    def describe(self) -> tuple[str, ...]:
+        """What was found out about the file, one line each, for printing."""
+        name = next((f" ({name})" for name, size in UNITS.items() if np.isclose(size, self.unit)), "")
+        lines = [f"unit: {self.unit:.6g} m{name}, {self.unit_how}", f"up: {self.up.upper()}, {self.up_how}"]
+        if self.positions != "none":
+            verb = "replace" if self.positions == "replace" else "add to"
+            lines.append(f"position channels: {verb} the OFFSET, {self.positions_how}")
+        return tuple(lines)
+
+
+def read(
+    path: Path, unit: float | str | None = None, up: str | None = None, joint_positions: str | None = None
+) -> Clip:
+    """A BVH file as a clip in metres, Y up; `clip.source` is its BvhSource.
+
+    Args:
+        path: the file.
+        unit: metres per file unit, or one of m, cm, mm, inch, CMU; estimated from the legs when None.
+        up: "y" or "z"; estimated from the motion when None.
+        joint_positions: "replace" or "add": whether position channels replace the OFFSET or are added to it;
+            None compares their median with the OFFSET.
+
+    Position channels of roots replace their OFFSET: in the data that people have (LAFAN1, PFNN, Autodesk and
+    Blender exports) the OFFSET of a root is zero or one frame's position, and adding it would move the whole
+    clip. With joint_positions="add" roots follow the letter of the format and are added to as well.
+
+    Raises:
+        FileError: the file is not a whole, sound BVH file.
+        RequestError: an option is wrong.
+    """
+    scale = _given_unit(unit)
+    if up is not None and up.lower() not in ("y", "z"):
+        raise unknown("up axis", up, ("y", "z"))
+    if joint_positions not in (None, "replace", "add"):
+        raise unknown("meaning of joint positions", joint_positions, ("replace", "add"))
+
+    header, motion = read_text(path)
+    nodes = header.nodes
+    frames = np.unique(np.linspace(0, len(motion) - 1, SAMPLE).astype(int)).tolist()
+    sample = np.concatenate([motion.values(f, f + 1) for f in frames])
+
+    raw = make_layout(nodes, added=False, unit=1.0, up="y")
+    positions, positions_how = _joint_positions(nodes, raw, sample, joint_positions)
+    raw = make_layout(nodes, joint_positions == "add" or positions == "add", 1.0, "y")
+    raw = _keep_roots(raw, nodes, joint_positions)
+    turned, moved = raw.decode(sample)
+    skeleton = _skeleton(nodes, raw, np.median(moved, axis=0), path)
+    mapping = find_mapping(skeleton)
+    clip = Clip(skeleton, turned, moved, header.fps, raw.translated)
+
+    scale, unit_how = (scale, "given") if scale else _estimate_unit(mapping, clip)
+    axis, up_how = (up.lower(), "given") if up else _estimate_up(mapping, clip)
+    layout = replace(raw, unit=scale, up=axis)
+    skeleton = Skeleton(skeleton.names, skeleton.parents, layout.vectors(skeleton.rest_translation))
+
+    rotation = np.empty((len(motion), len(nodes), 4))
+    translation = np.empty((len(motion), len(layout.translated), 3))
+    for start in range(0, len(motion), motion.chunk):
+        part = slice(start, min(start + motion.chunk, len(motion)))
+        rotation[part], translation[part] = layout.decode(motion.values(part.start, part.stop))
+    source = BvhSource(header, motion, skeleton, layout, unit_how, up_how, positions, positions_how)
+    return Clip(skeleton, rotation, translation, header.fps, layout.translated, path.stem, source)
+
+
+def _given_unit(unit: float | str | None) -> float | None:
+    """Metres per file unit from what the user gave."""
+    if unit is None:
+        return None
+    names = {name.lower(): size for name, size in UNITS.items()} | {"in": UNITS["inch"]}
+    try:
+        size = names[unit.lower()] if isinstance(unit, str) and unit.lower() in names else float(unit)
+    except (TypeError, ValueError):
+        raise unknown("unit", unit, (*UNITS, "or metres per unit, such as 0.01")) from None
+    if not 1e-9 < size < 1e9:
+        raise RequestError(
+            f"the unit {unit} is impossible", "it is metres per unit of the file", "Write for example 0.01."
+        )
+    return size
+
+
+def _joint_positions(
+    nodes: tuple[Node, ...], layout: Layout, sample: np.ndarray, given: str | None
+) -> tuple[str, str]:
+    """Whether position channels of joints that are not roots replace the OFFSET or add to it.
+
+    Every joint votes for what its median is nearer to: its OFFSET, or zero.
+    """
+    padded = np.concatenate([sample, np.zeros((len(sample), 1))], axis=1)
+    votes = []
+    for joint, columns in zip(layout.translated, layout.translation_columns):
+        if nodes[joint].parent < 0:
+            continue
+        offset = np.where(columns >= 0, nodes[joint].offset, 0.0)
+        median = np.median(padded[:, columns], axis=0)
+        if np.linalg.norm(offset) > 1e-6:
+            votes.append(bool(np.linalg.norm(median - offset) <= np.linalg.norm(median)))
+    if all(nodes[joint].parent < 0 for joint in layout.translated):
+        return "none", ""
+    if given:
+        return given, "given"
+    if 2 * sum(votes) >= len(votes):
+        return "replace", "as their median is the OFFSET"
+    return "add", "as their median is zero"
+
+
+def _keep_roots(layout: Layout, nodes: tuple[Node, ...], given: str | None) -> Layout:
+    """Roots' channels replace their OFFSET unless "add" was asked for."""
+    if given == "add":
+        return layout
+    base = layout.base.copy()
+    for row, joint in enumerate(layout.translated):
+        if nodes[joint].parent < 0:
+            base[row, layout.translation_columns[row] >= 0] = 0.0
+    return replace(layout, base=base)
+
+
+def _skeleton(nodes: tuple[Node, ...], layout: Layout, median: np.ndarray, path: Path) -> Skeleton:
+    """The skeleton in file units and axes. A bone that only the position channels give takes their median."""
+    names: list[str] = []
+    used = {node.name for node in nodes}
+    seen: set[str] = set()
+    for node in nodes:
+        name, count = node.name, 1
+        while name in seen or (count > 1 and name in used):
+            count += 1
+            name = f"{node.name}#{count}"
+        seen.add(name)
+        names.append(name)
+    rest = np.array([node.offset for node in nodes])
+    for row, joint in enumerate(layout.translated):
+        if nodes[joint].parent >= 0 and not rest[joint].any():
+            rest[joint] = median[row]
+    if len(nodes) > len([n for n in nodes if n.parent < 0]) and not any(
+        rest[j].any() for j, node in enumerate(nodes) if node.parent >= 0
+    ):
+        raise FileError(
+            f"cannot read {path.name} as BVH",
+            "all its bones have length zero",
+            "Export the clip with its skeleton.",
+        )
+    return Skeleton(tuple(names), tuple(node.parent for node in nodes), rest)
+
+
+def _estimate_unit(mapping: Mapping, clip: Clip) -> tuple[float, str]:
+    """Metres per file unit, and how it was found: from the legs, else from the size of the body."""
+    leg = mapping.leg_length
+    if np.isfinite(leg) and leg > 0:
+        for size in UNITS.values():
+            if LEG[0] <= size * leg <= LEG[1]:
+                return size, f"estimated from a leg of {size * leg:.2f} m"
+        return USUAL_LEG / leg, f"assumed, so that the leg is {USUAL_LEG} m"
+    positions = clip.positions()
+    extent = float(np.median(np.linalg.norm(np.ptp(positions, axis=1), axis=-1)))
+    for name in ("m", "cm", "mm", "inch", "CMU"):
+        if BODY[0] <= UNITS[name] * extent <= BODY[1]:
+            return UNITS[name], f"estimated from a body of {UNITS[name] * extent:.2f} m, no legs found"
+    return UNITS["cm"], "assumed, no legs found"
+
+
+def _estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
+    """The up axis: the mean direction from the feet to the head over the clip."""
+    head, left, right = (mapping.joints[JOINTS.index(j)] for j in ("Head", "LeftFoot", "RightFoot"))
+    if head is None or left is None or right is None:
+        return "y", "assumed, no head and feet found"
+    _, places = kinematics.forward(clip.rotation, clip.local_translation(), clip.skeleton.parents)
+    body = places[:, head] - 0.5 * (places[:, left] + places[:, right])
+    length = np.linalg.norm(body, axis=-1, keepdims=True)
+    mean = np.mean(body / np.where(length > 0, length, 1.0), axis=0)
+    # Someone who lies down for the whole clip says nothing; only a clear sign departs from the usual Y.
+    if mean[2] > 0.7 and abs(mean[1]) < mean[2]:
+        return "z", "estimated from the direction from feet to head"
+    if mean[1] > 0.5:
+        return "y", "estimated from the direction from feet to head"
+    return "y", "assumed, the direction from feet to head is not clear"

@@ -1,0 +1,88 @@
+"""interpose's own arrays in NumPy's .npz: every value of a clip, exactly, without pickle.
+
+Arrays: version; names (J,) text; parents (J,); rest_translation (J, 3), rest_rotation (J, 4), rest_scale (J,);
+rotation (F, J, 4); translation (F, K, 3); translated (K,); fps. Metres, Y up, quaternions (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import FileError, InterposeError
+
+VERSION = 1
+SIZE_LIMIT = 4 << 30  # bytes, unpacked
+ARRAYS = (
+    *("version", "names", "parents", "rest_translation", "rest_rotation", "rest_scale"),
+    *("rotation", "translation", "translated", "fps"),
+)
+
+
+def read(path: Path) -> Clip:
+    """The clip in an .npz file. Raises FileError when the file is damaged or is no clip."""
+    what = f"cannot read {path.name} as a clip"
+    again = "Write it again with interpose.save."
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+        if size > SIZE_LIMIT:
+            raise FileError(what, f"unpacked it is larger than {SIZE_LIMIT >> 30} GiB", "Split the clip.")
+        with np.load(path, allow_pickle=False) as file:
+            missing = [name for name in ARRAYS if name not in file.files]
+            if missing:
+                raise FileError(what, f"it has no array {', '.join(missing)}", again)
+            if int(file["version"]) != VERSION:
+                raise FileError(
+                    what, f"its version is {file['version']}, known is {VERSION}", "Install a newer interpose."
+                )
+            count = len(file["names"])
+            skeleton = Skeleton(
+                tuple(str(name) for name in file["names"]),
+                tuple(int(parent) for parent in file["parents"]),
+                np.asarray(file["rest_translation"], float).reshape(count, 3),
+                np.asarray(file["rest_rotation"], float).reshape(count, 4),
+                np.asarray(file["rest_scale"], float).reshape(count),
+            )
+            translated = tuple(int(joint) for joint in file["translated"])
+            if not set(skeleton.roots) <= set(translated) <= set(range(count)):
+                raise FileError(what, f"its translated joints are {translated}", again)
+            if not len(file["rotation"]):
+                raise FileError(what, "its motion has no frames", again)
+            rest = skeleton.rest_translation, skeleton.rest_rotation, skeleton.rest_scale
+            if not all(np.isfinite(values).all() for values in rest):
+                raise FileError(what, "its skeleton has values that are no numbers", again)
+            motion = file["rotation"], file["translation"]
+            return Clip(skeleton, *motion, float(file["fps"]), translated, path.stem)
+    except FileError:
+        raise
+    except InterposeError as error:
+        raise FileError(what, f"{error.what}: {error.why}", again) from None
+    except (OSError, MemoryError):
+        raise
+    except Exception as error:  # zipfile and NumPy raise whatever a damaged file makes them stumble over
+        raise FileError(what, f"it is no .npz file or damaged ({str(error).splitlines()[0]})", again) from None
+
+
+def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
+    """Write all arrays of the clip; returns no notes, as nothing is lost but a text format's layout."""
+    skeleton = clip.skeleton
+    np.savez(
+        stream,
+        allow_pickle=False,
+        version=np.array(VERSION),
+        names=np.array(skeleton.names),
+        parents=np.array(skeleton.parents),
+        rest_translation=skeleton.rest_translation,
+        rest_rotation=skeleton.rest_rotation,
+        rest_scale=skeleton.rest_scale,
+        rotation=clip.rotation,
+        translation=clip.translation,
+        translated=np.array(clip.translated),
+        fps=np.array(float(clip.fps)),
+    )
+    return ()
