@@ -22,6 +22,9 @@ SHORTEST = 0.1
 SHORTEST_WITHOUT_JUMP = 1.0
 # The least jump, in radians and metres.
 JUMP_TURN, JUMP_WAY = 0.01, 0.02
+# What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
+# decimals stand still for long.
+EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,10 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "rest pose" or "outlier": a first or last frame that has nothing to do with its neighbour, as in the
       BVH files of the CMU library.
     - "frozen": joints whose local rotation stops changing altogether while it moves elsewhere in the clip,
-      for at least .1 s (and 3 frames) with a jump at one end, or for a second away from the rest pose: a
-      hinge at its limit has no jump, and files write it as their rest pose. When everything that moves stands still at once, the root's position included, it
-      is one finding of the whole pose, jump or not.
+      for at least .1 s (and 3 frames) with a jump at one end; or for a second in which the joint would
+      usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
+      write it as their rest pose. When everything that moves stands still at once, the root's position
+      included, it is one finding of the whole pose, jump or not.
     - "frozen position": the same for a root whose position stands still while the pose does not.
 
     Joints that never move are not reported.
@@ -159,24 +163,25 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
 
     together: dict[Run, list[int]] = {}
     for joint in alive.tolist():
-        for run in _runs(still[:, joint] & ~whole, turned[:, joint], JUMP_TURN):
-            rest = rotations.angle(
-                clip.skeleton.rest_rotation[joint], clip.rotation[first + run.start, joint]
-            )
-            if _suspicious(run, clip.fps, at_limit=bool(rest < LIFELESS)):
+        steps = turned[:, joint]
+        for run in _runs(still[:, joint] & ~whole, steps, JUMP_TURN):
+            value = clip.rotation[first + run.start, joint]
+            at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
+            if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
                 together.setdefault(run, []).append(joint)
     for run, joints in together.items():
         add("frozen", tuple(names[joint] for joint in joints), run)
     for column in walking.tolist():
-        for run in _runs(stopped[:, column] & ~whole, moved[:, column], JUMP_WAY):
-            if _suspicious(run, clip.fps, at_limit=False):
+        steps = moved[:, column]
+        for run in _runs(stopped[:, column] & ~whole, steps, JUMP_WAY):
+            if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[clip.skeleton.roots[column]],), run)
     return found
 
 
-def _suspicious(run: Run, fps: float, at_limit: bool) -> bool:
-    """Whether a run of one joint is more than a pause or a hinge at its limit."""
+def _suspicious(run: Run, fps: float, pace: float) -> bool:
+    """Whether a run of one joint is more than a pause; `pace` is 1 / frames in which it usually moves far."""
     length = run.stop - run.start
     if run.jumps_in or run.jumps_out:
         return length >= max(3, SHORTEST * fps)
-    return not at_limit and length >= SHORTEST_WITHOUT_JUMP * fps
+    return length >= SHORTEST_WITHOUT_JUMP * fps and length * pace >= 1
