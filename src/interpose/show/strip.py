@@ -1,0 +1,275 @@
+"""A strip of stick figures over time, as SVG: one row a take, time from left to right."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interpose.show import figure
+from interpose.show.figure import Body, Span, Take
+
+WIDTH, LEFT, RIGHT, TOP, BOTTOM = 1280, 26, 26, 74, 66
+OBSERVED = "#8b929c"
+INK, FAINT, PAPER, LINE, SHADE = "#1f2328", "#656d76", "#ffffff", "#d5dae1", "#fff3dc"
+PITCH = np.radians(7.0)
+
+
+def choose_frames(gaps: Sequence[Span], start: int, stop: int, count: int) -> list[int]:
+    """`count` frames (fewer in short clips) out of start to stop - 1, about three times denser in gaps.
+
+    The last frame before a gap and the first one after it are among them.
+    """
+    pieces: list[tuple[int, int, bool]] = []
+    at = start
+    for gap_start, gap_stop in figure.merged(gaps):
+        gap_start, gap_stop = max(gap_start, start), min(gap_stop, stop)
+        if gap_start >= gap_stop:
+            continue
+        pieces += [(at, gap_start, False), (gap_start, gap_stop, True)]
+        at = gap_stop
+    pieces = [piece for piece in [*pieces, (at, stop, False)] if piece[0] < piece[1]]
+    lengths = [b - a for a, b, _ in pieces]
+    weight = np.array([length * (3.0 if gap else 1.0) for length, (_, _, gap) in zip(lengths, pieces)])
+    shares = [1] * len(pieces)
+    for _ in range(count - len(pieces)):
+        lack = [w / (s + 0.5) if s < n else -1.0 for w, s, n in zip(weight, shares, lengths)]
+        shares[int(np.argmax(lack))] += max(lack) > 0
+    frames: list[int] = []
+    for i, ((a, b, gap), n) in enumerate(zip(pieces, shares)):
+        if gap:
+            chosen = np.linspace(a - 1, b, n + 2)[1:-1]
+        elif n == 1:
+            chosen = np.array([b - 1 if i == 0 and len(pieces) > 1 else a])
+        else:
+            chosen = np.linspace(a, b - 1, n)
+        frames += [int(f) for f in np.clip(np.rint(chosen), a, b - 1)]
+    return sorted(set(frames))
+
+
+def excerpt(gaps: Sequence[Span], frames: int, fps: float) -> tuple[int, int]:
+    """The frames a strip shows: all gaps with two thirds of a second around them, or the longest one.
+
+    With more than four gaps, or more than twelve seconds from the first to the last, only the longest.
+    """
+    ranges = figure.merged(gaps)
+    if not ranges:
+        return 0, frames
+    start, stop = ranges[0][0], ranges[-1][1]
+    if len(ranges) > 4 or stop - start > 12 * fps:
+        start, stop = max(ranges, key=lambda gap: gap[1] - gap[0])
+    around = max(round(fps * 2 / 3), 1)
+    return max(start - around, 0), min(stop + around, frames)
+
+
+def view(towards: np.ndarray, travels: bool) -> np.ndarray:
+    """(3, 3) rows: right, up and towards the viewer, for a motion along the unit vector `towards`.
+
+    Travel goes to the right, seen from the side and a little from the front; motions in place are seen
+    from the front and a little from the side.
+    """
+    turn = np.radians(28.0 if travels else 52.0)
+    side = np.cross(towards, figure.UP)
+    viewer = np.cos(turn) * side + np.sin(turn) * towards
+    right = np.cross(figure.UP, viewer)
+    viewer = np.cos(PITCH) * viewer + np.sin(PITCH) * figure.UP
+    return np.stack([right, np.cross(viewer, right), viewer])
+
+
+def _seconds(value: float) -> str:
+    return f"{value:.2f} s"
+
+
+def _figure(points: np.ndarray, head: np.ndarray | None, drawn: Body, colors: list[str], scale: float) -> str:
+    """SVG of one pose: points (J, 3) in pixels and depth (towards the viewer), far bones first."""
+    parts: list[tuple[float, str, str]] = []
+    for joint, parent in enumerate(drawn.parents):
+        if parent < 0:
+            if joint not in drawn.parents:
+                x, y, depth = points[joint]
+                dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colors[joint]}"/>'
+                parts.append((depth, "", dot))
+            continue
+        (x1, y1, d1), (x2, y2, d2) = points[parent], points[joint]
+        style = f'stroke="{colors[joint]}" stroke-width="{max(drawn.thickness[joint] * scale, 1.2):.1f}"'
+        parts.append(((d1 + d2) / 2, style, f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}"))
+    if head is not None:
+        x, y, depth = head
+        radius = drawn.head_radius * scale
+        circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colors[drawn.head]}"/>'
+        parts.append((depth, "", circle))
+    parts.sort(key=lambda part: part[0])
+    out, run, open_style = [], "", ""
+    for _, style, shape in [*parts, (0.0, "", "")]:
+        if style != open_style and run:
+            out.append(f'<path {open_style} d="{run}"/>')
+            run = ""
+        if style:
+            run += shape
+        else:
+            out.append(shape)
+        open_style = style
+    return "".join(out)
+
+
+def _shades(color: str, drawn: Body) -> list[str]:
+    """A color a bone: left limbs darker, right ones lighter."""
+    tones = {-1: figure.mix(color, "#000000", 0.28), 0: color, 1: figure.mix(color, "#ffffff", 0.38)}
+    return [tones[side] for side in drawn.sides]
+
+
+def strip(
+    takes: Sequence[Take],
+    parents: Sequence[int],
+    fps: float,
+    gaps: Iterable[Any],
+    path: str | Path | None = None,
+    title: str = "",
+    *,
+    names: Sequence[str] | None = None,
+    count: int = 14,
+    span: tuple[int, int] | None = None,
+) -> str:
+    """Stick figures over time as an SVG picture: one row a take, the gap shaded and denser in time.
+
+    Every figure stands in a slot of its own, placed by the root of the *first* take, so that another
+    take's figure beside its slot is one beside the truth. Observed frames are gray, gap frames have the
+    take's color; left limbs are darker than right ones (when `names` tell them apart).
+
+    Args:
+        takes: Take(name, positions (F, J, 3) in metres and Y up, color), all of the same shape.
+        parents: index of each joint's parent, -1 for roots.
+        fps: frames a second.
+        gaps: `Gap` objects or pairs (start, stop) of frames, half-open.
+        path: where to write the picture, too (UTF-8).
+        title: the line above it.
+        names: joint names, for the sides and the head.
+        count: how many figures in a row.
+        span: the frames to show, half-open; without it those around the gaps.
+
+    Returns:
+        The SVG text.
+
+    Raises:
+        RequestError: takes that do not fit each other or the skeleton.
+    """
+    figure.check(takes, parents, fps, names)
+    frames = len(takes[0].positions)
+    missing = figure.spans(gaps, frames, names)
+    start, stop = span or excerpt(missing, frames, fps)
+    shown = choose_frames(missing, max(start, 0), min(stop, frames), count)
+    reference = np.asarray(takes[0].positions, float)
+    drawn = figure.body(reference, parents, names)
+    floor = figure.floor_height(reference[shown], drawn.feet)
+    inside = [gap for gap in missing if gap.start < stop and gap.stop > start]
+    towards, travels = figure.heading(reference, drawn, inside)
+    camera = view(towards, travels)
+
+    # Poses beside their slot's middle: (takes, figures, J, 3) right, up, towards the viewer, in metres.
+    middle = reference[shown, :1] * (1 - figure.UP) + floor * figure.UP
+    poses = np.stack([np.asarray(take.positions, float)[shown] - middle for take in takes]) @ camera.T
+    heads = None
+    if drawn.head >= 0:
+        centers = [drawn.head_center(np.asarray(take.positions, float)[shown]) for take in takes]
+        heads = (np.stack(centers) - middle[:, 0]) @ camera.T
+
+    slot = (WIDTH - LEFT - RIGHT) / len(shown)
+    wide = float(np.percentile(np.ptp(poses[..., 0], axis=2), 75))
+    tall = float((poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())) + 0.12)
+    scale = float(np.clip(min(1.12 * slot / max(wide, 1e-6), 170 / max(tall, 1e-6)), 10, 108))
+    below = max(0.0, float(-np.percentile(poses[..., 1], 0.5))) * scale
+    row = tall * scale + below + 34
+    height = TOP + row * len(takes) + BOTTOM
+    edge = lambda i: LEFT + slot * i  # noqa: E731
+    center = [edge(i + 0.5) for i in range(len(shown))]
+    # Wide poses in the outer slots move inwards, in all rows alike.
+    reach = poses[..., 0] * scale
+    stands = [
+        float(np.clip(x, 10 - reach[:, i].min(), max(WIDTH - 10 - reach[:, i].max(), 10 - reach[:, i].min())))
+        for i, x in enumerate(center)
+    ]
+
+    svg = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0f}" width="{WIDTH}" '
+        f'height="{height:.0f}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">',
+        f"<title>{figure.text(title or 'Stick figures over time')}</title>",
+        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1:.0f}" rx="10" fill="{PAPER}" '
+        f'stroke="{LINE}"/>',
+    ]
+    if title:
+        svg.append(
+            f'<text x="{LEFT}" y="34" font-size="18" font-weight="600" fill="{INK}">{figure.text(title)}</text>'
+        )
+
+    sided = ", left limbs dark, right limbs light" if any(drawn.sides) else ""
+    svg.append(
+        f'<text x="{WIDTH - RIGHT}" y="33" text-anchor="end" font-size="12" fill="{FAINT}">'
+        f"gray: observed{sided}</text>"
+    )
+
+    bottom = height - BOTTOM
+    for gap_start, gap_stop in figure.merged(inside):
+        within = [i for i, f in enumerate(shown) if gap_start <= f < gap_stop]
+        if not within:
+            continue
+        x, wide_px = edge(within[0]), slot * len(within)
+        svg.append(
+            f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide_px:.1f}" height="{bottom - TOP + 22:.1f}" '
+            f'rx="6" fill="{SHADE}"/>'
+        )
+        length = gap_stop - gap_start
+        label = f"gap {gap_start}:{gap_stop}, {length} frame{'s' * (length != 1)}, {_seconds(length / fps)}"
+        label = label if wide_px > 190 else f"gap {gap_start}:{gap_stop}" if wide_px > 90 else "gap"
+        svg.append(
+            f'<text x="{x + wide_px / 2:.1f}" y="{TOP - 6}" text-anchor="middle" font-size="12" '
+            f'fill="#8a5a00">{label}</text>'
+        )
+
+    for r, take in enumerate(takes):
+        ground = TOP + row * (r + 1) - below - 8
+        label_y = TOP + row * r + 20
+        svg.append(f'<g class="take"><title>{figure.text(take.name)}</title>')
+        svg.append(
+            f'<line x1="{LEFT}" y1="{ground:.1f}" x2="{WIDTH - RIGHT}" y2="{ground:.1f}" stroke="{LINE}" '
+            'stroke-width="1.5"/>'
+        )
+        for i in range(len(shown)):
+            x = stands[i] + poses[r, i, 0, 0] * scale
+            svg.append(
+                f'<ellipse cx="{x:.1f}" cy="{ground:.1f}" rx="{0.24 * scale:.1f}" ry="{0.045 * scale:.1f}" '
+                'fill="#000000" fill-opacity=".09"/>'
+            )
+        for i, frame in enumerate(shown):
+            tint = figure.tinted(missing, drawn.parents, frame)
+            in_gap, gray = _shades(take.color, drawn), _shades(OBSERVED, drawn)
+            colors = [a if t else b for a, b, t in zip(in_gap, gray, tint)]
+            place = np.array([scale, -scale, scale])
+            offset = np.array([stands[i], ground, 0.0])
+            points = poses[r, i] * place + offset
+            head = None if heads is None else heads[r, i] * place + offset
+            kind = "filled" if tint.any() else "observed"
+            svg.append(
+                f'<g class="figure {kind}" data-frame="{frame}" fill="none" stroke-linecap="round" '
+                f'stroke-linejoin="round">{_figure(points, head, drawn, colors, scale)}</g>'
+            )
+        svg.append(
+            f'<circle cx="{LEFT + 6}" cy="{label_y - 4.5:.1f}" r="5" fill="{take.color}"/>'
+            f'<text x="{LEFT + 18}" y="{label_y:.1f}" font-weight="600" fill="{INK}" stroke="{PAPER}" '
+            f'stroke-width="3" paint-order="stroke">{figure.text(take.name)}</text></g>'
+        )
+
+    for i, frame in enumerate(shown):
+        svg.append(
+            f'<line x1="{center[i]:.1f}" y1="{bottom + 2:.1f}" x2="{center[i]:.1f}" y2="{bottom + 8:.1f}" '
+            f'stroke="{FAINT}"/>'
+            f'<text x="{center[i]:.1f}" y="{bottom + 24:.1f}" text-anchor="middle" fill="{INK}">{frame}</text>'
+            f'<text x="{center[i]:.1f}" y="{bottom + 40:.1f}" text-anchor="middle" font-size="11" '
+            f'fill="{FAINT}">{_seconds(frame / fps)}</text>'
+        )
+    svg.append("</svg>\n")
+    result = "\n".join(svg)
+    if path is not None:
+        Path(path).write_text(result, encoding="utf-8")
+    return result
