@@ -19,9 +19,6 @@ NAMES: dict[str, tuple[str, ...]] = {
     "LeftLeg": ("leftleg", "leftlowerleg", "leftshin", "lowerlegl", "calfl", "ltibia", "leftknee"),
     "LeftFoot": ("leftfoot", "footl", "lfoot", "leftankle"),
     "LeftToe": ("lefttoe", "lefttoebase", "toesl", "balll", "ltoes", "lefttoes"),
-    "Spine": ("spine", "spine01", "lowerback"),
-    "Spine1": ("spine1", "spine02", "upperback"),
-    "Spine2": ("spine2", "chest", "spine03", "thorax"),
     "Neck": ("neck1", "neck", "neck01", "lowerneck"),
     "Head": ("head",),
     "LeftShoulder": ("leftshoulder", "leftcollar", "shoulderl", "claviclel", "lclavicle"),
@@ -111,6 +108,18 @@ class Mapping:
         return (~known).astype(float) @ (self.weights.T > 0) == 0
 
 
+def _spine(skeleton: Skeleton, found: dict[str, int | None]) -> None:
+    """The spine by topology: from above the hips up to the joint where both arms meet."""
+    hips, left, right = (found[name] for name in ("Hips", "LeftArm", "RightArm"))
+    if hips is None or left is None or right is None:
+        return
+    meet = next((j for j in skeleton.ancestors(left) if j in skeleton.ancestors(right)), hips)
+    chain = [j for j in (meet, *skeleton.ancestors(meet)) if hips in skeleton.ancestors(j)][::-1]
+    if chain:
+        found["Spine"], found["Spine2"] = chain[0], chain[-1]
+        found["Spine1"] = chain[len(chain) // 2] if len(chain) > 2 else None
+
+
 def find_mapping(skeleton: Skeleton) -> Mapping:
     """The mapping of a skeleton by its joint names; look at `missing` and `usable` for how far it went."""
     plain = [_plain(name) for name in skeleton.names]
@@ -118,6 +127,7 @@ def find_mapping(skeleton: Skeleton) -> Mapping:
     table = _table()
     for joint in JOINTS:
         taken = set(found.values())
-        hits = [plain.index(name) for name in table[joint] if name in plain]
+        hits = [plain.index(name) for name in table.get(joint, ()) if name in plain]
         found[joint] = next((hit for hit in hits if hit not in taken), None)
+    _spine(skeleton, found)
     return Mapping(skeleton, tuple(found[joint] for joint in JOINTS))

@@ -1,0 +1,6 @@
+"""The public data sets: where their clips are, who performs, which split they belong to, and packs of them."""
+
+from interpose.datasets.catalogue import DATASETS, Entry, clips, split_of
+from interpose.datasets.pack import Pack, build_pack
+
+__all__ = ["DATASETS", "Entry", "Pack", "build_pack", "clips", "split_of"]

@@ -1,0 +1,104 @@
+"""The clips of each data set in the layout in which it is published, with performer, label and split.
+
+Splits are by performer and stand in splits.json; every recipe and benchmark obeys them.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from interpose.clip import Clip
+from interpose.errors import FileError, unknown
+from interpose.formats import load
+
+FPS = 30.0
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One published clip."""
+
+    dataset: str
+    path: Path
+    performer: str
+    label: str
+    trains_only: bool = False
+
+    @property
+    def split(self) -> str:
+        return "train" if self.trains_only else split_of(self.dataset, self.performer)
+
+    def load(self) -> Clip:
+        """The clip, without the rest pose that CMU's BVH files begin with."""
+        clip = load(self.path)
+        return clip.slice(1, len(clip)) if self.dataset == "cmu" else clip
+
+
+@cache
+def _splits() -> dict[str, dict[str, list[str]]]:
+    return json.loads((files("interpose.datasets") / "splits.json").read_text())  # type: ignore[no-any-return]
+
+
+def split_of(dataset: str, performer: str) -> str:
+    """"train", "validation" or "test"."""
+    for split in ("test", "validation"):
+        if performer in _splits()[dataset][split]:
+            return split
+    return "train"
+
+
+def _lafan1(folder: Path) -> list[Entry]:
+    found = []
+    for part in ("bvh", "cuts", "."):
+        for path in sorted((folder / part).glob("*.bvh")):
+            match = re.fullmatch(r"([A-Za-z]+)\d+_(subject\d)(_.*)?", path.stem)
+            if match:
+                found.append(Entry("lafan1", path, match[2], match[1], trains_only=part == "cuts"))
+    return [entry for entry in found if not (entry.trains_only and split_of("lafan1", entry.performer) == "test")]
+
+
+def _bandai(folder: Path) -> list[Entry]:
+    found = []
+    for path in sorted(folder.glob("*/data/*.bvh")):
+        part, content, style, _ = path.stem.split("_")
+        found.append(Entry("bandai", path, f"{part}/{style}", content))
+    return found
+
+
+def _pfnn(folder: Path) -> list[Entry]:
+    return [Entry("pfnn", path, "pfnn", "locomotion") for path in sorted(folder.glob("**/*.bvh"))]
+
+
+def _cmu(folder: Path) -> list[Entry]:
+    return [Entry("cmu", path, path.parent.name, "") for path in sorted(folder.glob("bvh/*/*.bvh"))]
+
+
+DATASETS: dict[str, Callable[[Path], list[Entry]]] = {
+    "lafan1": _lafan1,
+    "bandai": _bandai,
+    "pfnn": _pfnn,
+    "cmu": _cmu,
+}
+
+
+def clips(dataset: str, data: Path, split: str | None = None) -> list[Entry]:
+    """The clips of a data set below `data`, all or those of one split, in a fixed order.
+
+    Raises RequestError for an unknown data set and FileError when there is nothing of it.
+    """
+    if dataset not in DATASETS:
+        raise unknown("data set", dataset, DATASETS)
+    found = DATASETS[dataset](Path(data) / dataset)
+    if not found:
+        raise FileError(
+            f"no clips of {dataset}",
+            f"there is no published layout of it below {Path(data) / dataset}",
+            "docs/data.md says where to get each data set and how to unpack it; name the folder with --data.",
+        )
+    return [entry for entry in found if split in (None, entry.split)]

@@ -1,0 +1,209 @@
+"""The convolutional autoencoder of Kaufmann et al. 2020, from joint positions to joint positions.
+
+`Autoencoder` is the paper's network. `Infiller` puts around it all that belongs to the method: the 69-row
+image of a motion, the normaliser, and the way back to a global trajectory; it is what ONNX holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from interpose.geometry.ground import turn, wrap
+from interpose.skeletons import JOINTS
+from interpose.skeletons.body import PAIRS, facing
+
+ROWS = 3 * len(JOINTS) + 3  # positions of 22 joints, two velocities on the floor, one turning rate
+
+
+class Autoencoder(nn.Module):
+    """Five encoding and five decoding units of two 3x3 (de)convolutions each: 4,703,425 parameters.
+
+    (B, 1, 69, T) to the same shape, for any T: pooling rounds up and every deconvolution is told the size
+    that it has to give back. Source: Kaufmann et al. 2020, section 3.2 and figure 4.
+    """
+
+    def __init__(self, channels: tuple[int, ...] = (32, 64, 128, 256, 256)) -> None:
+        super().__init__()
+        into = (1, *channels[:-1])
+        self.encoder = nn.ModuleList(
+            nn.ModuleList([nn.Conv2d(a, b, 3, padding=1), nn.Conv2d(b, b, 3, padding=1)])
+            for a, b in zip(into, channels)
+        )
+        self.decoder = nn.ModuleList(
+            nn.ModuleList([nn.ConvTranspose2d(b, b, 3, 2, 1), nn.ConvTranspose2d(b, a, 3, 1, 1)])
+            for a, b in zip(reversed((1, *channels[:-1])), reversed(channels))
+        )
+        for module in self.modules():
+            if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
+                nn.init.xavier_uniform_(module.weight)
+                assert module.bias is not None
+                nn.init.zeros_(module.bias)
+
+    def forward(self, image: Tensor) -> Tensor:
+        sizes = []
+        x = image
+        for first, second in self.encoder:  # type: ignore[misc]
+            x = functional.leaky_relu(second(functional.leaky_relu(first(x))))
+            sizes.append(x.shape[-2:])
+            x = functional.max_pool2d(x, 2, ceil_mode=True)
+        for i, (first, second) in enumerate(self.decoder):  # type: ignore[misc]
+            x = second(functional.leaky_relu(first(x, output_size=sizes[-1 - i])))
+            if i < len(self.decoder) - 1:
+                x = functional.leaky_relu(x)
+        return x
+
+
+@dataclass
+class Image:
+    """A motion as an image (section 3.1), with what is needed to read it.
+
+    Attributes:
+        rows: (B, 69, T) body-frame positions in metres (66), floor velocity in metres a frame (2) and
+            turning rate in radians a frame, both relative to the previous frame; not normalised.
+        known: (B, 69, T) whether a row follows from observed positions alone.
+        floor: (B,) height of the lowest observed joint.
+        root: (B, T, 3) hips on the floor, and yaw (B, T): the trajectory.
+        placed: (B, T) whether that trajectory is observed.
+    """
+
+    rows: Tensor
+    known: Tensor
+    floor: Tensor
+    root: Tensor
+    yaw: Tensor
+    placed: Tensor
+
+
+def to_image(positions: Tensor, observed: Tensor) -> Image:
+    """Positions (B, T, 22, 3) and which of them are observed (B, T, 22) to the image of the motion."""
+    height = torch.where(observed, positions[..., 1], torch.full_like(positions[..., 1], 1e4))
+    lowest = height.amin(dim=(1, 2))
+    floor = torch.where(lowest < 1e4, lowest, torch.zeros_like(lowest))
+    root = positions[..., 0, :] * positions.new_tensor([1.0, 0.0, 1.0]) + floor[:, None, None] * (
+        positions.new_tensor([0.0, 1.0, 0.0])
+    )
+    yaw = facing(positions, observed)
+    pair = torch.stack([observed[..., left] & observed[..., right] for left, right in PAIRS], dim=-1).any(-1)
+    placed = observed[..., 0] & pair
+    body = turn(positions - root[..., None, :], -yaw[..., None])
+    velocity = turn(root[:, 1:] - root[:, :-1], -yaw[:, :-1])
+    rate = wrap(yaw[:, 1:] - yaw[:, :-1])
+    moves = torch.stack([velocity[..., 0], velocity[..., 2], rate], dim=-1)
+    # Nothing comes before the first frame: it repeats the second one's movement, unobserved.
+    moves = torch.cat([moves[:, :1], moves], dim=1)
+    moved = torch.cat([torch.zeros_like(placed[:, :1]), placed[:, 1:] & placed[:, :-1]], dim=1)
+    rows = torch.cat([body.flatten(2), moves], dim=2)
+    known = torch.cat(
+        [(observed & placed[..., None]).repeat_interleave(3, dim=2), moved[..., None].expand(-1, -1, 3)], dim=2
+    )
+    return Image(rows.transpose(1, 2), known.transpose(1, 2), floor, root, yaw, placed)
+
+
+def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
+    """For each frame the last frame at or before it, and the first at or after it, that is placed.
+
+    (B, T) booleans to two (B, T) of indices. At an open end both name the only neighbour there is; where
+    nothing is placed at all, frame 0.
+    """
+    length = placed.shape[1]
+    frame = torch.arange(length, device=placed.device)
+    past = (frame[None, :] <= frame[:, None]) & placed[:, None, :]
+    future = (frame[None, :] >= frame[:, None]) & placed[:, None, :]
+    last = torch.where(past, frame, -1).amax(2)
+    first = torch.where(future, frame, length).amin(2)
+    last, first = torch.where(last >= 0, last, first), torch.where(first < length, first, last)
+    return torch.where(last < length, last, 0), torch.where(first >= 0, first, 0)
+
+
+def integrate(rows: Tensor, image: Image) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+    """The trajectory from predicted movement, anchored at observed frames.
+
+    Inside a gap the root's velocity and turning rate are summed up from the last observed frame; that
+    drifts, so at the gap's other end the residual in x, z and yaw is spread back by a ramp with zero slope
+    at both ends.
+
+    Returns:
+        root (B, T, 3) and yaw (B, T) without and with that correction.
+    """
+    before, after = neighbours(image.placed)
+    length = rows.shape[2]
+    frame = torch.arange(length, device=rows.device)
+
+    def pick(values: Tensor, index: Tensor) -> Tensor:
+        if values.ndim == 3:
+            index = index[..., None].expand(-1, -1, values.shape[2])
+        return values.gather(1, index)
+
+    inside = (after > before) & (frame > before) & (frame < after)
+    share = (frame - before) / torch.where(after > before, after - before, 1)
+    ramp = torch.where(inside, share * share * (3 - 2 * share), 0.0)
+
+    def walk(yaw: Tensor) -> Tensor:
+        """The path (B, T, 3), from an arbitrary start, of the predicted velocities under a given yaw."""
+        step = torch.stack([rows[:, 66], torch.zeros_like(rows[:, 66]), rows[:, 67]], dim=-1)
+        earlier = torch.cat([yaw[:, :1], yaw[:, :-1]], dim=1)
+        return torch.cumsum(turn(step, earlier), dim=1)
+
+    turned = torch.cumsum(rows[:, 68], dim=1)
+    yaw = pick(image.yaw, before) + turned - pick(turned, before)
+    # What the sums say of the first frame after the gap, against what is observed there.
+    end = pick(image.yaw, before) + pick(turned, after) - pick(turned, before)
+    straight = yaw + ramp * wrap(pick(image.yaw, after) - end)
+    yaw = torch.where(image.placed, image.yaw, yaw)
+    straight = torch.where(image.placed, image.yaw, straight)
+
+    path = walk(yaw)
+    root = pick(image.root, before) + path - pick(path, before)
+    path = walk(straight)
+    start = pick(image.root, before) - pick(path, before)
+    fixed = start + path + ramp[..., None] * (pick(image.root, after) - start - pick(path, after))
+    placed = image.placed[..., None]
+    return torch.where(placed, image.root, root), yaw, torch.where(placed, image.root, fixed), straight
+
+
+class Infiller(nn.Module):
+    """The whole method as one graph: observed positions in, a complete motion out.
+
+    Positions are metres of a body scaled to the canonical leg, Y up, at 30 fps. Unobserved positions may
+    hold anything finite; they have no influence.
+    """
+
+    mean: Tensor
+    std: Tensor
+
+    def __init__(self, network: nn.Module | None = None) -> None:
+        super().__init__()
+        self.network = network if network is not None else Autoencoder()
+        self.register_buffer("mean", torch.zeros(ROWS, 1))
+        self.register_buffer("std", torch.ones(ROWS, 1))
+
+    def predict(self, image: Image) -> Tensor:
+        """Normalised rows (B, 69, T), the network's answer to what is known; masked values are 0."""
+        masked = torch.where(image.known, (image.rows - self.mean) / self.std, 0.0)
+        return self.network(masked[:, None])[:, 0]  # type: ignore[no-any-return]
+
+    def forward(self, positions: Tensor, observed: Tensor) -> tuple[Tensor, Tensor]:
+        """Complete a motion.
+
+        Args:
+            positions: (B, T, 22, 3).
+            observed: (B, T, 22) booleans.
+
+        Returns:
+            The completed positions (B, T, 22, 3) on the network's own trajectory, uncorrected and with
+            the drift taken out. At observed frames the trajectory is the observed one, the pose the
+            network's reconstruction.
+        """
+        positions = torch.where(observed[..., None], positions, 0.0)
+        image = to_image(positions, observed)
+        rows = self.predict(image) * self.std + self.mean
+        body = rows[:, : 3 * len(JOINTS)].transpose(1, 2).unflatten(2, (len(JOINTS), 3))
+        root, yaw, fixed, straight = integrate(rows, image)
+        return (
+            turn(body, yaw[..., None]) + root[..., None, :],
+            turn(body, straight[..., None]) + fixed[..., None, :],
+        )

@@ -1,0 +1,163 @@
+"""The training loop shared by all recipes: budget, schedule, averaged weights, checkpoints, log."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, distributed as dist, nn
+
+from interpose.errors import FileError
+from interpose.training.budget import Budget
+
+
+def pick_device() -> torch.device:
+    """The GPU of this process when there is one, else the CPU. Under torchrun, also joins the group."""
+    gpu = torch.cuda.is_available()
+    if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not dist.is_initialized():
+        dist.init_process_group("nccl" if gpu else "gloo")
+    return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if gpu else torch.device("cpu")
+
+
+def rank() -> int:
+    return dist.get_rank() if dist.is_initialized() else 0
+
+
+@dataclass
+class Settings:
+    """What all recipes share.
+
+    The learning rate warms up over the first hundredth of the budget and falls to zero along half a
+    cosine over the rest of it; weights are averaged exponentially.
+    """
+
+    learning_rate: float = 1e-3
+    warm_up: float = 0.01
+    average: float = 0.999
+    seed: int = 1
+    every_seconds: float = 300.0
+
+
+class Trainer:
+    """Runs one recipe in one folder: `checkpoint.pt`, `averaged.pt` and `log.jsonl` are in there.
+
+    Args:
+        model: what is trained.
+        loss: from a random generator and the fraction of the budget spent to a scalar loss.
+        validate: measures the averaged model; its figures go to the log.
+    """
+
+    def __init__(
+        self,
+        model: nn.Module,
+        loss: Callable[[np.random.Generator, float], Tensor],
+        validate: Callable[[nn.Module], dict[str, float]],
+        folder: Path,
+        budget: Budget,
+        settings: Settings,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        self.model, self.loss, self.validate = model, loss, validate
+        self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
+        self.device = next(model.parameters()).device
+        self.optimizer = torch.optim.Adam(model.parameters(), settings.learning_rate)
+        self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
+        # Every process draws batches of its own.
+        self.rng = np.random.default_rng([settings.seed, rank()])
+        folder.mkdir(parents=True, exist_ok=True)
+
+    def resume(self) -> bool:
+        """Go on where an interrupted run stopped, when the folder holds one."""
+        path = self.folder / "checkpoint.pt"
+        if not path.exists():
+            return False
+        try:
+            state = torch.load(path, map_location=self.device, weights_only=False)
+            self.model.load_state_dict(state["model"])
+            self.averaged.load_state_dict(state["averaged"])
+            self.optimizer.load_state_dict(state["optimizer"])
+        except (RuntimeError, KeyError, EOFError, OSError) as reason:
+            raise FileError(
+                f"cannot go on from {path}", str(reason).splitlines()[0], "Delete it or name another folder."
+            ) from None
+        self.rng = np.random.default_rng([self.settings.seed, rank(), state["steps"]])
+        self.budget.spent_seconds, self.budget.spent_steps = state["seconds"], state["steps"]
+        return True
+
+    def save(self) -> None:
+        state = {
+            "model": self.model.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "optimizer": self.optimizer.state_dict(),
+            "seconds": self.budget.spent_seconds,
+            "steps": self.budget.spent_steps,
+        }
+        for name, what in (("checkpoint.pt", state), ("averaged.pt", self.averaged.state_dict())):
+            torch.save(what, self.folder / (name + ".new"))
+            os.replace(self.folder / (name + ".new"), self.folder / name)
+
+    def _rate(self) -> float:
+        fraction = self.budget.fraction
+        warm = min(1.0, max(fraction, 1e-4) / self.settings.warm_up)
+        return self.settings.learning_rate * warm * 0.5 * (1 + math.cos(math.pi * fraction))
+
+    def _share(self) -> float | None:
+        """Average the gradients over all processes; the device time that all of them have spent."""
+        if not dist.is_initialized():
+            return None
+        gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
+        spent = gradients[0].new_tensor([self.budget.clock()])
+        flat = torch.cat([spent, *(g.flatten() for g in gradients)])
+        dist.all_reduce(flat)
+        for gradient, total in zip(gradients, flat[1:].split([g.numel() for g in gradients])):
+            gradient.copy_(total.view_as(gradient) / dist.get_world_size())
+        return float(flat[0])
+
+    def run(self) -> nn.Module:
+        """Train until the budget is spent; the averaged model comes back."""
+        self.budget.start(gpu=self.device.type == "cuda")
+        told, losses = time.monotonic() - self.settings.every_seconds * 0.8, []
+        while self.budget.fraction < 1:
+            for group in self.optimizer.param_groups:
+                group["lr"] = self._rate()
+            loss = self.loss(self.rng, self.budget.fraction)
+            self.optimizer.zero_grad(set_to_none=True)
+            loss.backward()
+            self.budget.step(self._share())
+            self.optimizer.step()
+            losses.append(loss.detach())
+            with torch.no_grad():
+                # Early on the average follows closely, so that it never carries the random start along.
+                keep = min(self.settings.average, (1 + self.budget.spent_steps) / (10 + self.budget.spent_steps))
+                for mean, now in zip(self.averaged.parameters(), self.model.parameters()):
+                    mean.lerp_(now, 1 - keep)
+                for mean, now in zip(self.averaged.buffers(), self.model.buffers()):
+                    mean.copy_(now)
+            due = time.monotonic() - told > self.settings.every_seconds or self.budget.fraction >= 1
+            if due and rank() == 0:
+                self._tell(float(torch.stack(losses).mean()))
+                told, losses = time.monotonic(), []
+        if dist.is_initialized():
+            dist.barrier()
+        return self.averaged
+
+    def _tell(self, loss: float) -> None:
+        entry = {
+            "step": self.budget.spent_steps,
+            "hours": round(self.budget.spent_seconds / 3600, 4),
+            "fraction": round(self.budget.fraction, 4),
+            "loss": round(loss, 5),
+        }
+        entry |= {name: round(value, 4) for name, value in self.validate(self.averaged).items()}
+        with (self.folder / "log.jsonl").open("a") as log:
+            log.write(json.dumps(entry) + "\n")
+        self.save()
+        self.say("  ".join(f"{name} {value}" for name, value in entry.items()))
