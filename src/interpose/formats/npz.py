@@ -1,7 +1,8 @@
 """interpose's own arrays in NumPy's .npz: every value of a clip, exactly, without pickle.
 
-Arrays: version; names (J,) text; parents (J,); rest_translation (J, 3), rest_rotation (J, 4), rest_scale (J,);
-rotation (F, J, 4); translation (F, K, 3); translated (K,); fps. Metres, Y up, quaternions (w, x, y, z).
+Arrays: version; names (J,) text; parents (J,); rest_translation (J, 3), rest_rotation (J, 4),
+rest_scale (J,); rotation (F, J, 4); translation (F, K, 3); translated (K,); fps.
+Metres, Y up, quaternions (w, x, y, z).
 """
 
 from __future__ import annotations
@@ -37,9 +38,8 @@ def read(path: Path) -> Clip:
             if missing:
                 raise FileError(what, f"it has no array {', '.join(missing)}", again)
             if int(file["version"]) != VERSION:
-                raise FileError(
-                    what, f"its version is {file['version']}, known is {VERSION}", "Install a newer interpose."
-                )
+                why = f"its version is {file['version']}, known is {VERSION}"
+                raise FileError(what, why, "Install a newer interpose.")
             count = len(file["names"])
             skeleton = Skeleton(
                 tuple(str(name) for name in file["names"]),
@@ -65,7 +65,8 @@ def read(path: Path) -> Clip:
     except (OSError, MemoryError):
         raise
     except Exception as error:  # zipfile and NumPy raise whatever a damaged file makes them stumble over
-        raise FileError(what, f"it is no .npz file or damaged ({str(error).splitlines()[0]})", again) from None
+        detail = (str(error) or type(error).__name__).splitlines()[0]
+        raise FileError(what, f"it is no .npz file or damaged ({detail})", again) from None
 
 
 def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:

@@ -25,8 +25,8 @@ _FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\
 
 # Rates that people record and deliver at: a rounded frame time such as 0.033333 means one of these.
 RATES = (
-    *(10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 75, 90, 100),
-    *(120000 / 1001, 120, 125, 144, 150, 180, 200, 240, 250, 300, 360, 400, 480, 500, 600, 1000),
+    *(10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 75, 90),
+    *(100, 120000 / 1001, 120, 125, 144, 150, 180, 200, 240, 250, 300, 360, 400, 480, 500, 600, 1000),
 )
 
 
@@ -153,12 +153,13 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
     ahead: int | None = None
     in_end = False
 
+    number = 0
+
     def bad(why: str, fix: str = "The file is damaged: export it again.") -> FileError:
         return FileError(what, f"line {number}: {why}", fix)
 
-    lines = text.removeprefix(b"\xef\xbb\xbf").splitlines()
-    number = 1
-    for number, line in enumerate(lines, 1):
+    for line in text.removeprefix(b"\xef\xbb\xbf").splitlines():
+        number += 1
         try:
             decoded = line.decode("utf-8")
         except UnicodeDecodeError:
@@ -187,7 +188,8 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
                 brace = words.index("{") if "{" in words else len(words)
                 parent = blocks[-1] if blocks else None
                 ahead = len(nodes)
-                nodes.append(Node(" ".join(words[:brace]) or f"joint{ahead}", -1 if parent is None else parent))
+                name = " ".join(words[:brace]) or f"joint{ahead}"
+                nodes.append(Node(name, -1 if parent is None else parent))
                 if len(nodes) > JOINT_LIMIT:
                     raise bad(f"more than {JOINT_LIMIT} joints", "interpose reads no larger skeletons.")
                 words, waiting = words[brace:], True
@@ -219,7 +221,8 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
                 count = int(words[0]) if words and words[0].isdigit() and len(words[0]) < 4 else -1
                 given = words[1 : words.index("}")] if "}" in words else words[1:]
                 if count != len(given):
-                    raise bad(f"CHANNELS says {words[0][:20] if words else 'nothing'}, {len(given)} names follow")
+                    said = words[0][:20] if words else "nothing"
+                    raise bad(f"CHANNELS says {said}, {len(given)} names follow")
                 found = [_CHANNEL.match(w) for w in given]
                 if not all(found) or len({w.lower() for w in given}) < len(given):
                     raise bad(

@@ -199,9 +199,8 @@ def _bad_line(text: np.ndarray, header: Header, what: str, seen: int = -1) -> Fi
         for word in words if len(words) != header.channels else ():
             if not NUMBER.match(word.decode("latin-1")):
                 shown = word[:40].decode("latin-1")
-                return FileError(
-                    what, f"line {number + offset}: {shown!r} is no number", "Replace it, or export the clip again."
-                )
+                why = f"line {number + offset}: {shown!r} is no number"
+                return FileError(what, why, "Replace it, or export the clip again.")
         if len(words) != header.channels and wrong is None:
             wrong = number + offset, len(words)
     short = 0 <= seen < header.frames * header.channels

@@ -20,7 +20,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "CMU": 0.0254 / 0.45
 LEG = 0.45, 1.25  # metres: thigh and shin of a child and of a giant
 USUAL_LEG = 0.85
 BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
-SAMPLE = 101  # frames looked at for estimates
+SAMPLE = 51  # frames looked at for estimates
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +100,9 @@ def read(
     header, motion = read_text(path)
     nodes = header.nodes
     frames = np.unique(np.linspace(0, len(motion) - 1, SAMPLE).astype(int)).tolist()
-    sample = np.concatenate([motion.values(f, f + 1) for f in frames])
+    # Short clips are parsed once; of long ones the sample is parsed by itself, to keep memory small.
+    short = motion.values(0, len(motion)) if len(motion) <= motion.chunk else None
+    sample = np.concatenate([motion.values(f, f + 1) for f in frames]) if short is None else short[frames]
 
     raw = make_layout(nodes, added=False, unit=1.0, up="y")
     positions, positions_how = _joint_positions(nodes, raw, sample, joint_positions)
@@ -120,7 +122,8 @@ def read(
     translation = np.empty((len(motion), len(layout.translated), 3))
     for start in range(0, len(motion), motion.chunk):
         part = slice(start, min(start + motion.chunk, len(motion)))
-        rotation[part], translation[part] = layout.decode(motion.values(part.start, part.stop))
+        values = motion.values(part.start, part.stop) if short is None else short
+        rotation[part], translation[part] = layout.decode(values)
     source = BvhSource(header, motion, skeleton, layout, unit_how, up_how, positions, positions_how)
     return Clip(skeleton, rotation, translation, header.fps, layout.translated, path.stem, source)
 

@@ -49,7 +49,7 @@ def _same_skeleton(clip: Clip, source: BvhSource) -> bool:
 
 
 def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str, ...]:
-    motion, layout = source.motion, source.layout
+    motion = source.motion
     stream.write(_header(clip, source.header))
     stream.write(motion.text[len(source.header.text) : motion.starts[0]].tobytes())
     style = _style(motion)
@@ -132,7 +132,8 @@ def _put_motion(
         for k, columns in enumerate(layout.translation_columns):
             has = columns >= 0
             fresh[:, columns[has]] = moved[:, k, has]
-            values[:, columns[has]] = np.where(moved[:, k, has], positions[:, k, has], values[:, columns[has]])
+            kept = values[:, columns[has]]
+            values[:, columns[has]] = np.where(moved[:, k, has], positions[:, k, has], kept)
             if not has.all():
                 missed = np.abs(positions[:, k, ~has]).max() * layout.unit
                 lost.metres[layout.translated[k]] = max(lost.metres[layout.translated[k]], missed)
