@@ -104,7 +104,8 @@ def check(takes: Sequence[Take], parents: Sequence[int], fps: float, names: Sequ
         if found != shape or len(found) != 3 or found[0] == 0 or found[1:] != (len(parents), 3):
             raise RequestError(
                 f"cannot draw the take {take.name!r}",
-                f"its positions are {found}; all takes must be (F, {len(parents)}, 3) with the same F above zero",
+                f"its positions are {found}; "
+                f"all takes must be (F, {len(parents)}, 3) with the same F above zero",
             )
         if not np.isfinite(take.positions).all():
             raise RequestError(f"cannot draw the take {take.name!r}", "some positions are no finite numbers")
@@ -131,6 +132,16 @@ def spans(
         if start < stop:
             found.append(Span(start, stop, joints))
     return sorted(found, key=lambda span: (span.start, span.stop))
+
+
+def window(span: tuple[int, int], frames: int) -> tuple[int, int]:
+    """The part of `span` that lies inside a clip of `frames` frames; RequestError when there is none."""
+    start, stop = max(span[0], 0), min(span[1], frames)
+    if start >= stop:
+        raise RequestError(
+            f"cannot draw the frames {span[0]}:{span[1]}", f"the clip has the frames 0 to {frames - 1}"
+        )
+    return start, stop
 
 
 def merged(gaps: Sequence[Span]) -> list[tuple[int, int]]:
@@ -203,7 +214,9 @@ def body(positions: np.ndarray, parents: Sequence[int], names: Sequence[str] | N
     feet = [j for j, name in enumerate(plain) if re.search(r"toe|ball", name) and sides[j]]
     feet = feet or [j for j, name in enumerate(plain) if re.search(r"foot|ankle", name) and sides[j]]
     # One joint a side: the first of the toes, not the tip of every one of them.
-    feet = [next(j for j in feet if sides[j] == side) for side in (-1, 1) if any(sides[j] == side for j in feet)]
+    feet = [
+        next(j for j in feet if sides[j] == side) for side in (-1, 1) if any(sides[j] == side for j in feet)
+    ]
     if not feet:
         low = np.median(positions[:, ends, 1], axis=0)
         feet = [ends[i] for i in np.argsort(low, kind="stable")[:2]]

@@ -82,13 +82,13 @@ def player(
         pause(); an address that ends in `#frame=120` opens at that frame, paused.
 
     Raises:
-        RequestError: takes that do not fit each other or the skeleton.
+        RequestError: takes that do not fit each other or the skeleton, a span outside the clip.
     """
     figure.check(takes, parents, fps, names)
     frames, joints = np.shape(takes[0].positions)[:2]
     missing = figure.spans(gaps, frames, names)
-    start, stop = span or _shown(missing, frames, max(LARGEST // (joints * len(takes)), 1))
-    start, stop = max(start, 0), min(stop, frames)
+    largest = max(LARGEST // (joints * len(takes)), 1)
+    start, stop = figure.window(span or _shown(missing, frames, largest), frames)
     positions = [np.asarray(take.positions[start:stop], float) for take in takes]
     drawn = figure.body(positions[0], parents, names)
     inside = [

@@ -37,9 +37,9 @@ def log_ticks(low: float, high: float) -> list[float]:
     return found or [low, high]
 
 
-def _label(value: float) -> str:
-    # Whole thousands as 20k: steps of a training are long numbers.
-    if abs(value) >= 10000 and value % 1000 == 0:
+def _label(value: float, largest: float = 0.0) -> str:
+    # Whole thousands as 20k on axes that reach far: steps of a training are long numbers.
+    if largest >= 10000 and value and value % 1000 == 0:
         return f"{value / 1e6:g}M" if value % 1e6 == 0 else f"{value / 1000:g}k"
     return f"{value:.6g}"
 
@@ -48,7 +48,8 @@ def _thin(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if len(x) <= POINTS:
         return x, y
     edges = np.linspace(0, len(x), POINTS + 1).astype(int)
-    return tuple(np.array([v[a:b].mean() for a, b in zip(edges, edges[1:])]) for v in (x, y))  # type: ignore
+    x, y = (np.array([v[a:b].mean() for a, b in zip(edges, edges[1:])]) for v in (x, y))
+    return x, y
 
 
 def _width(words: str) -> float:
@@ -101,13 +102,13 @@ def line_plot(
     if log:
         room = (y_high / y_low) ** 0.05 if y_high > y_low else 2.0
         y_low, y_high = y_low / room, y_high * room
-        y_marks, turn = log_ticks(y_low, y_high), np.log10
+        y_marks = log_ticks(y_low, y_high)
     else:
         # From zero where the values are above it and not far away: heights then compare honestly.
         room = 0.06 * (y_high - y_low) or abs(y_high) * 0.1 or 1.0
         y_low = 0.0 if 0 <= y_low < 0.6 * y_high else y_low - room
         y_high += room
-        y_marks, turn = ticks(y_low, y_high), np.asarray
+        y_marks = ticks(y_low, y_high)
 
     # The legend wraps; the plot starts below it.
     legend: list[tuple[str, str, float, int]] = []
@@ -125,18 +126,19 @@ def line_plot(
         return LEFT + (value - x_low) / (x_high - x_low) * (WIDTH - LEFT - RIGHT)
 
     def py(value: float) -> float:
-        low, high = float(turn(y_low)), float(turn(y_high))
-        return height - BOTTOM - (float(turn(value)) - low) / (high - low) * (height - BOTTOM - top)
+        low, high, at = (math.log10(v) if log else v for v in (y_low, y_high, value))
+        return height - BOTTOM - (at - low) / (high - low) * (height - BOTTOM - top)
 
     svg = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
         f'height="{height}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">',
         f"<title>{figure.text(title)}</title>",
-        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1}" rx="10" fill="{PAPER}" stroke="#d5dae1"/>',
+        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1}" rx="10" fill="{PAPER}" '
+        'stroke="#d5dae1"/>',
         f'<text x="{LEFT}" y="32" font-size="17" font-weight="600" fill="{INK}">{figure.text(title)}</text>',
     ]
     for name, color, x0, line in legend:
-        y0 = 56 + 20 * line
+        y0 = 56.0 + 20 * line
         svg.append(
             f'<line x1="{x0:.1f}" y1="{y0}" x2="{x0 + 22:.1f}" y2="{y0}" stroke="{color}" stroke-width="3" '
             f'stroke-linecap="round"/><text x="{x0 + 30:.1f}" y="{y0 + 4.5}" fill="{INK}">'
@@ -146,14 +148,16 @@ def line_plot(
         y0 = py(value)
         svg.append(
             f'<line x1="{LEFT}" y1="{y0:.1f}" x2="{WIDTH - RIGHT}" y2="{y0:.1f}" stroke="{GRID}"/>'
-            f'<text x="{LEFT - 10}" y="{y0 + 4.5:.1f}" text-anchor="end" fill="{FAINT}">{_label(value)}</text>'
+            f'<text x="{LEFT - 10}" y="{y0 + 4.5:.1f}" text-anchor="end" fill="{FAINT}">'
+            f"{_label(value)}</text>"
         )
     base = height - BOTTOM
     for value in ticks(x_low, x_high, 8):
         x0 = px(value)
         svg.append(
             f'<line x1="{x0:.1f}" y1="{base}" x2="{x0:.1f}" y2="{base + 5}" stroke="{FAINT}"/>'
-            f'<text x="{x0:.1f}" y="{base + 21}" text-anchor="middle" fill="{FAINT}">{_label(value)}</text>'
+            f'<text x="{x0:.1f}" y="{base + 21}" text-anchor="middle" fill="{FAINT}">'
+            f"{_label(value, x_high)}</text>"
         )
     svg.append(f'<line x1="{LEFT}" y1="{base}" x2="{WIDTH - RIGHT}" y2="{base}" stroke="{FAINT}"/>')
     for words, value in (marks or {}).items():
@@ -177,7 +181,8 @@ def line_plot(
                 dots += f'<circle cx="{px(a):.1f}" cy="{py(b):.1f}" r="3.2"/>'
         svg.append(
             f'<g class="series" fill="{color}"><title>{figure.text(name)}</title><path fill="none" '
-            f'stroke="{color}" stroke-width="2.2" stroke-linejoin="round" stroke-linecap="round" d="{shape}"/>'
+            f'stroke="{color}" stroke-width="2.2" stroke-linejoin="round" stroke-linecap="round" '
+            f'd="{shape}"/>'
             f"{dots}</g>"
         )
     middle = (top + base) / 2

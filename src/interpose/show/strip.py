@@ -153,13 +153,13 @@ def strip(
         The SVG text.
 
     Raises:
-        RequestError: takes that do not fit each other or the skeleton.
+        RequestError: takes that do not fit each other or the skeleton, a span outside the clip.
     """
     figure.check(takes, parents, fps, names)
     frames = len(takes[0].positions)
     missing = figure.spans(gaps, frames, names)
-    start, stop = span or excerpt(missing, frames, fps)
-    shown = choose_frames(missing, max(start, 0), min(stop, frames), count)
+    start, stop = figure.window(span or excerpt(missing, frames, fps), frames)
+    shown = choose_frames(missing, start, stop, count)
     reference = np.asarray(takes[0].positions, float)
     drawn = figure.body(reference, parents, names)
     floor = figure.floor_height(reference[shown], drawn.feet)
@@ -177,13 +177,14 @@ def strip(
 
     slot = (WIDTH - LEFT - RIGHT) / len(shown)
     wide = float(np.percentile(np.ptp(poses[..., 0], axis=2), 75))
-    tall = float((poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())) + 0.12)
+    tall = float(
+        (poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())) + 0.12
+    )
     scale = float(np.clip(min(1.12 * slot / max(wide, 1e-6), 170 / max(tall, 1e-6)), 10, 108))
     below = max(0.0, float(-np.percentile(poses[..., 1], 0.5))) * scale
     row = tall * scale + below + 34
     height = TOP + row * len(takes) + BOTTOM
-    edge = lambda i: LEFT + slot * i  # noqa: E731
-    center = [edge(i + 0.5) for i in range(len(shown))]
+    center = [LEFT + slot * (i + 0.5) for i in range(len(shown))]
     # Wide poses in the outer slots move inwards, in all rows alike.
     reach = poses[..., 0] * scale
     stands = [
@@ -200,7 +201,8 @@ def strip(
     ]
     if title:
         svg.append(
-            f'<text x="{LEFT}" y="34" font-size="18" font-weight="600" fill="{INK}">{figure.text(title)}</text>'
+            f'<text x="{LEFT}" y="34" font-size="18" font-weight="600" fill="{INK}">'
+            f"{figure.text(title)}</text>"
         )
 
     sided = ", left limbs dark, right limbs light" if any(drawn.sides) else ""
@@ -214,9 +216,10 @@ def strip(
         within = [i for i, f in enumerate(shown) if gap_start <= f < gap_stop]
         if not within:
             continue
-        x, wide_px = edge(within[0]), slot * len(within)
+        x, wide_px = LEFT + slot * within[0], slot * len(within)
         svg.append(
-            f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide_px:.1f}" height="{bottom - TOP + 22:.1f}" '
+            f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide_px:.1f}" '
+            f'height="{bottom - TOP + 22:.1f}" '
             f'rx="6" fill="{SHADE}"/>'
         )
         length = gap_stop - gap_start
@@ -264,7 +267,8 @@ def strip(
         svg.append(
             f'<line x1="{center[i]:.1f}" y1="{bottom + 2:.1f}" x2="{center[i]:.1f}" y2="{bottom + 8:.1f}" '
             f'stroke="{FAINT}"/>'
-            f'<text x="{center[i]:.1f}" y="{bottom + 24:.1f}" text-anchor="middle" fill="{INK}">{frame}</text>'
+            f'<text x="{center[i]:.1f}" y="{bottom + 24:.1f}" text-anchor="middle" '
+            f'fill="{INK}">{frame}</text>'
             f'<text x="{center[i]:.1f}" y="{bottom + 40:.1f}" text-anchor="middle" font-size="11" '
             f'fill="{FAINT}">{_seconds(frame / fps)}</text>'
         )
