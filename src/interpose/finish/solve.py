@@ -11,6 +11,7 @@ from collections.abc import Collection
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
+from interpose.finish.windows import ramp
 from interpose.geometry import kinematics, rotations
 from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_mapping
@@ -44,7 +45,7 @@ def solve(clip: Clip, observation: Observation, joints: tuple[int, ...], positio
     clip = _carry(clip, observation, target)
     clip = _aim(clip, observation, target)
     parts = [
-        _refine(clip.slice(i, i + BLOCK), observation.slice(i, i + BLOCK), joints, positions[i : i + BLOCK])
+        refine(clip.slice(i, i + BLOCK), observation.slice(i, i + BLOCK), joints, positions[i : i + BLOCK])
         for i in range(0, len(clip), BLOCK)
     ]
     if not parts:
@@ -201,13 +202,7 @@ def _twist(axis: np.ndarray, bone: np.ndarray, wanted: np.ndarray) -> np.ndarray
     return rotations.exp((share * angle)[:, None] * axis)
 
 
-def ramp(x: np.ndarray) -> np.ndarray:
-    """A smooth step: 0 up to x = 0, 1 from x = 1, with zero slope at both."""
-    x = np.clip(x, 0.0, 1.0)
-    return x * x * (3.0 - 2.0 * x)
-
-
-def _refine(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
+def refine(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
     """A few damped Gauss-Newton steps on all joint angles at once.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;

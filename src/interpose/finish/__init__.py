@@ -1,0 +1,7 @@
+"""The guarantees: what makes a completion usable, the same for every method."""
+
+from interpose.finish.complete import complete
+from interpose.finish.report import Completion, GapReport, Provenance, Report
+from interpose.finish.solve import solve
+
+__all__ = ["Completion", "GapReport", "Provenance", "Report", "complete", "solve"]

@@ -1,0 +1,352 @@
+"""The one place where a clip is completed: any method, then the guarantees.
+
+Precedence when they collide: observed values, then bones, then seams, then feet.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.evaluation import metrics
+from interpose.finish import feet, seams
+from interpose.finish.report import Completion, GapReport, Provenance, Report
+from interpose.finish.solve import solve, solve_error
+from interpose.finish.windows import grow, runs
+from interpose.geometry import rotations
+from interpose.methods.classical import Linear, Spline
+from interpose.methods.protocol import Method, Raw
+from interpose.observation import Gap, Observation
+
+# Positions further out than this (metres) are as good as no numbers.
+NOWHERE = 1e4
+# Frames solved at once.
+CHUNK = 4096
+# Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second) beyond
+# which they are not: that is a jump in value.
+ROUNDS, KINK = 6, 8.0
+
+
+@dataclass
+class _Span:
+    """A range of frames in which something is missing, and what becomes of it."""
+
+    start: int
+    stop: int
+    method: str
+    problem: str | None = None
+    notes: list[str] = field(default_factory=list)
+
+    def around(self, frames: int, margin: int) -> tuple[int, int, tuple[int, int]]:
+        """The frames lo to hi - 1 around it, and its own range counted from lo."""
+        lo, hi = max(0, self.start - margin), min(frames, self.stop + margin)
+        return lo, hi, (self.start - lo, self.stop - lo)
+
+
+def complete(
+    clip: Clip, observation: Observation, method: Method, seed: int | None = None, fallback: Method | None = None
+) -> Completion:
+    """Complete a clip by a method, and make the result usable.
+
+    Observed values come back bit for bit, bones keep their lengths, there is no pop at seams, planted feet stay
+    planted, and what is unobserved in `clip` has no influence on anything. Gaps that the method refuses, or at
+    whose seams it fails, are filled by `fallback` (default: the spline), which the report names.
+
+    Args:
+        clip: F frames; its unobserved values may be anything.
+        observation: what is known, (F, J). Values with less than full trust may be changed.
+        method: what completes it.
+        seed: for methods that sample.
+        fallback: the simpler method.
+
+    Raises:
+        RequestError: the observation does not fit the clip, or nothing fills a gap.
+    """
+    if observation.rotation.shape != clip.rotation.shape[:2]:
+        raise RequestError(
+            "the observation does not fit the clip",
+            f"it has {observation.rotation.shape} frames and joints, the clip {clip.rotation.shape[:2]}",
+            "Make it from the same clip, for example with Observation.from_gaps.",
+        )
+    fallback = fallback or Spline()
+    hidden = wipe(clip, observation)
+    known = _trusted(hidden, observation)
+    gaps = known.gaps(clip.skeleton)
+    if not gaps:
+        return Completion(clip, Raw(clip), np.zeros(known.rotation.shape, np.int8), Report(method.name))
+
+    spans = [_Span(start, stop, method.name) for start, stop in runs(~known.frames)]
+    for gap in gaps:
+        if reason := method.refuses(hidden, gap):
+            _of(spans, gap).problem = f"{method.name} refuses {gap}: {reason}"
+    if all(span.problem for span in spans):
+        raw = _second(fallback, hidden, observation, gaps, seed)
+    else:
+        raw = method.complete(hidden, observation, seed)
+
+    opinion, error = _opinion(raw, known, spans)
+    current = _merge(opinion, hidden, known)
+    limit = seams.limit(hidden, known)
+    before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
+    unheld: dict[Gap, tuple[float, float] | None] = {}
+
+    def settle(chosen: list[_Span], source: Clip) -> None:
+        # All spans take each step together: two that share a lone key are neighbours at every step.
+        for span in chosen:
+            _fade(current, source, hidden, known, span)
+        unheld.update({gap: _slide(current, known, gap) for gap in gaps if _of(spans, gap) in chosen})
+        for span in chosen:
+            _plant(current, known, span)
+        for _ in range(ROUNDS):
+            for span in chosen:
+                _soften(current, known, span, limit)
+
+    for span in spans:
+        span.problem = span.problem or _lost(opinion, hidden, known, span)
+    settle([span for span in spans if not span.problem], opinion)
+    for span in spans:
+        span.problem = span.problem or _pop(current, known, span, limit)
+    failed = [span for span in spans if span.problem and fallback.name != method.name]
+    if failed:
+        second = _second(fallback, hidden, observation, gaps, seed).clip
+        merged = _merge(second, hidden, known)
+        for span in failed:
+            _write(current, merged, span.start, (span.start, span.stop))
+            span.method = fallback.name
+            span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
+        settle(failed, second)
+    for span in spans:
+        if above := _pop(current, known, span, limit):
+            span.notes.append(f"flagged: {above}")
+
+    columns = list(clip.translated)
+    finished = clip.with_motion(
+        np.where(known.rotation[..., None], clip.rotation, current.rotation),
+        np.where(known.translation[:, columns, None], clip.translation, current.translation),
+    )
+    _verify(finished, clip, known)
+    reports = [
+        _report(finished, known, gap, _of(spans, gap), raw, error, before[gap], limit, unheld.get(gap)) for gap in gaps
+    ]
+    provenance = _provenance(known, spans, method.name, opinion, finished)
+    return Completion(finished, raw, provenance, Report(method.name, reports))
+
+
+def wipe(clip: Clip, observation: Observation) -> Clip:
+    """The clip with unobserved values replaced by the linear completion of the observed ones.
+
+    Unobserved values are not even looked at: they may be no numbers. What a file format left in the clip is
+    dropped, because it may hold them, too.
+    """
+    columns = list(clip.translated)
+    rotation = np.where(observation.rotation[..., None], clip.rotation, [1.0, 0, 0, 0])
+    translation = np.where(observation.translation[:, columns, None], clip.translation, 0.0)
+    bare = replace(clip, rotation=rotation, translation=translation, source=None)
+    return Linear().complete(bare, observation).clip
+
+
+def _trusted(clip: Clip, observation: Observation) -> Observation:
+    """What must come back unchanged: observed with full trust. Translations that are not animated always are."""
+    trusted = observation.trust >= 1
+    translation = observation.translation & trusted
+    still = [j for j in range(len(clip.skeleton)) if j not in clip.translated]
+    translation[:, still] = True
+    return Observation(observation.rotation & trusted, translation)
+
+
+def _of(spans: list[_Span], gap: Gap) -> _Span:
+    return next(span for span in spans if span.start <= gap.start and gap.stop <= span.stop)
+
+
+def _second(fallback: Method, hidden: Clip, observation: Observation, gaps: list[Gap], seed: int | None) -> Raw:
+    """The fallback's completion; raises RequestError when it refuses, too."""
+    for gap in gaps:
+        if reason := fallback.refuses(hidden, gap):
+            raise RequestError(f"cannot fill {gap}", f"{fallback.name}: {reason}", "Choose another method.")
+    return fallback.complete(hidden, observation, seed)
+
+
+def _opinion(raw: Raw, known: Observation, spans: list[_Span]) -> tuple[Clip, np.ndarray | None]:
+    """What the method says as rotations, also of the observed frames beside gaps, and how far (F,) metres the
+    solve is from its positions, where it speaks positions."""
+    if raw.positions is None:
+        return raw.clip, None
+    clip, beside = raw.clip, seams.reach(raw.clip.fps)
+    positions = np.asarray(raw.positions, float)
+    lost = ~(np.abs(positions) < NOWHERE).all(axis=(1, 2))
+    for span in spans:
+        if lost[max(span.start - beside, 0) : span.stop + beside].any():
+            span.problem = span.problem or "it gave positions that are no numbers"
+    free = Observation(~grow(~known.rotation, beside), ~grow(~known.translation, beside))
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    error = np.full(len(clip), np.nan)
+    for first, last in runs(~free.frames & ~lost):
+        for start in range(first, last, CHUNK):
+            part = slice(start, min(start + CHUNK, last))
+            one = clip.slice(part.start, part.stop)
+            solved = solve(one, free.slice(part.start, part.stop), raw.joints, positions[part])
+            rotation[part], translation[part] = solved.rotation, solved.translation
+            error[part] = solve_error(solved, raw.joints, positions[part])
+    return clip.with_motion(rotation, translation), error
+
+
+def _merge(opinion: Clip, hidden: Clip, known: Observation) -> Clip:
+    """The opinion where something is missing, what is observed elsewhere: arrays of its own."""
+    seen = known.translation[:, list(hidden.translated), None]
+    return hidden.with_motion(
+        np.where(known.rotation[..., None], hidden.rotation, rotations.normalize(opinion.rotation)),
+        np.where(seen, hidden.translation, opinion.translation),
+    )
+
+
+def _jump(clip: Clip, known: Observation, frames: np.ndarray) -> float | None:
+    """The largest velocity jump at seam frames, in metres per frame squared; None where there are none."""
+    frames = frames[(frames > 0) & (frames < len(clip) - 1)]
+    if frames.size == 0:
+        return None
+    return max(float(np.linalg.norm(seams.jumps(clip, known, edge), axis=-1).max()) for edge in frames)
+
+
+def _at(gap: Gap) -> np.ndarray:
+    return np.array([gap.start - 1, gap.stop])
+
+
+def _seams(current: Clip, known: Observation, span: _Span) -> float | None:
+    """The largest velocity jump at the seams of a span."""
+    return _jump(current, known, seams.edges(known, current.translated, (span.start, span.stop)))
+
+
+def _write(current: Clip, source: Clip, at: int, inner: tuple[int, int]) -> None:
+    """Put the frames `inner` of `source` into `current`, from frame `at` on."""
+    part = slice(at, at + inner[1] - inner[0])
+    current.rotation[part] = source.rotation[slice(*inner)]
+    current.translation[part] = source.translation[slice(*inner)]
+
+
+def _lost(opinion: Clip, hidden: Clip, known: Observation, span: _Span) -> str | None:
+    """Why the method's motion cannot be eased into the observed one, if so."""
+    lo, hi, inner = span.around(len(hidden), 2)
+    _, apart = seams.difference(opinion.slice(lo, hi), hidden.slice(lo, hi), known.slice(lo, hi), inner)
+    if apart > seams.ABSURD:
+        return f"it is {100 * apart:.0f} cm away from what is observed beside the gap"
+    return None
+
+
+def _pop(current: Clip, known: Observation, span: _Span, limit: float | None) -> str | None:
+    """What is wrong with the seams of a span, if anything."""
+    jump = _seams(current, known, span)
+    if limit is None or jump is None or jump <= limit:
+        return None
+    return f"the velocity jumps by {100 * jump:.2f} cm/frame^2 at a seam, above the limit of {100 * limit:.2f}"
+
+
+def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _Span) -> None:
+    """Fade what the source says differently of the observed frames; nothing, if it repeats them."""
+    lo, hi, inner = span.around(len(hidden), seams.reach(hidden.fps))
+    base, seen = hidden.slice(lo, hi), known.slice(lo, hi)
+    raw = source.slice(lo, hi)
+    if seams.difference(raw, base, seen, inner)[0] > seams.EXACT:
+        _write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
+
+
+def _plant(current: Clip, known: Observation, span: _Span) -> None:
+    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
+    held = feet.plant(current.slice(lo, hi), known.slice(lo, hi), inner)
+    _write(current, held, span.start, inner)
+
+
+def _soften(current: Clip, known: Observation, span: _Span, limit: float | None) -> None:
+    jump = _seams(current, known, span)
+    if limit is None or jump is None or not limit < jump < KINK / current.fps:
+        return
+    lo, hi, inner = span.around(len(current), 2)
+    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limit)
+    _write(current, softer, span.start, inner)
+
+
+def _slide(clip: Clip, known: Observation, gap: Gap) -> tuple[float, float] | None:
+    margin = round(feet.NEARBY * clip.fps)
+    lo, hi = max(0, gap.start - margin), min(len(clip), gap.stop + margin)
+    return feet.measure(clip.slice(lo, hi), known.slice(lo, hi), gap.start - lo, gap.stop - lo)
+
+
+def _verify(finished: Clip, clip: Clip, known: Observation) -> None:
+    """Observed values are the same to the last bit, or this program is wrong."""
+    seen = known.translation[:, list(clip.translated)]
+    for mine, theirs, mask in (
+        (finished.rotation, clip.rotation, known.rotation),
+        (finished.translation, clip.translation, seen),
+    ):
+        if mine[mask].tobytes() != theirs[mask].tobytes():
+            raise RuntimeError("internal error: observed values were changed")
+
+
+def _provenance(
+    known: Observation, spans: list[_Span], method: str, opinion: Clip, finished: Clip
+) -> np.ndarray:
+    """(F, J) codes."""
+    missing = ~(known.rotation & known.translation)
+    codes = np.where(missing, Provenance.METHOD, Provenance.OBSERVED).astype(np.int8)
+    # A quaternion and its negative are the same rotation.
+    same = np.abs((rotations.normalize(opinion.rotation) * finished.rotation).sum(-1)) > 1 - 1e-12
+    columns = list(finished.translated)
+    same[:, columns] &= np.abs(opinion.translation - finished.translation).max(-1) < 1e-6
+    codes[missing & ~same] = Provenance.CORRECTED
+    for span in spans:
+        if span.method != method:
+            codes[span.start : span.stop][missing[span.start : span.stop]] = Provenance.FALLBACK
+    return codes
+
+
+def _report(
+    finished: Clip,
+    known: Observation,
+    gap: Gap,
+    span: _Span,
+    raw: Raw,
+    error: np.ndarray | None,
+    before: float | None,
+    limit: float | None,
+    unheld: tuple[float, float] | None,
+) -> GapReport:
+    part = finished.slice(gap.start, gap.stop)
+    own = span.problem is None
+    skeleton = finished.skeleton
+    lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
+    lengths[list(finished.translated)] = np.nan
+    after = _jump(finished, known, _at(gap))
+    feet_now = _slide(finished, known, gap)
+    solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
+    return GapReport(
+        gap.start,
+        gap.stop,
+        gap.joints,
+        span.method,
+        model=raw.notes.get("model") if own else None,
+        solve_error=_centi(solved),
+        seam_before=_centi(before),
+        seam_after=_centi(after),
+        seam_limit=_centi(limit),
+        bone_deviation=100 * metrics.bone_deviation(part.positions(), skeleton.parents, lengths),
+        foot_slide=feet_now[0] if feet_now else None,
+        foot_slide_before=unheld[0] if unheld else None,
+        foot_travel=feet_now[1] if feet_now else None,
+        drift=_centi(_drift(raw.notes, gap)) if own else None,
+        notes=tuple(span.notes),
+    )
+
+
+def _drift(notes: dict[str, Any], gap: Gap) -> float | None:
+    """`notes["drift"]`: metres, one number or one for each gap under its "start:stop"."""
+    drift = notes.get("drift")
+    if isinstance(drift, dict):
+        drift = drift.get(f"{gap.start}:{gap.stop}")
+    return None if drift is None else float(drift)
+
+
+def _centi(metres: float | None) -> float | None:
+    return None if metres is None else 100.0 * metres

@@ -1,0 +1,253 @@
+"""Planted feet stay planted: find contacts in a gap, hold them, bend the legs accordingly.
+
+Everything is relative to the stances that are observed near the gap, so that floors need not be flat. A foot is
+its ankle and its toe; a contact of either holds that one in place on the floor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.evaluation import metrics
+from interpose.finish.windows import ramp, runs
+from interpose.geometry import rotations
+from interpose.observation import Observation
+from interpose.skeletons import JOINTS, find_mapping
+
+# A contact begins below the first speed (metres a second) and ends above the second; it is no higher above the
+# floor than HIGH and lasts at least SHORT seconds.
+SLOW, FAST, HIGH, SHORT = 0.30, 0.50, 0.04, 0.10
+# Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam.
+BLEND = 0.15
+# A foot may sink this far (metres) below the lowest stances nearby; the bound is rounded off over as much.
+SINK = 0.005
+# Seconds of observed motion beside a gap in which stances are looked for.
+NEARBY = 2.0
+
+
+@dataclass(frozen=True)
+class Leg:
+    """Joint indices of one leg."""
+
+    thigh: int
+    knee: int
+    ankle: int
+    toe: int
+
+
+def legs(skeleton: Skeleton) -> tuple[Leg, ...]:
+    """The legs that the skeleton has, by the names of its joints; none when it has no such names."""
+    found = dict(zip(JOINTS, find_mapping(skeleton).joints))
+    chains = [[found[side + part] for part in ("UpLeg", "Leg", "Foot", "Toe")] for side in ("Left", "Right")]
+    return tuple(
+        Leg(*chain)  # type: ignore[arg-type]
+        for chain in chains
+        if None not in chain and all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:]))  # type: ignore[arg-type]
+    )
+
+
+def ends(skeleton: Skeleton) -> list[int]:
+    """Ankles and toes: the joints by which slide and travel are judged."""
+    return [joint for leg in legs(skeleton) for joint in (leg.ankle, leg.toe)]
+
+
+def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
+    """(F, n) the height at which each joint rests: that of observed stances, interpolated over what is missing.
+
+    positions: (F, n, 3) of ankles and toes; known: (F, n) where they are observed. On each side of a gap the
+    low end of the heights of slow feet within two seconds is taken (of all heights if none is slow).
+    """
+    frames, count = positions.shape[:2]
+    floor = np.empty((frames, count))
+    slow = metrics.speed(positions, fps) < SLOW
+    near = max(1, round(NEARBY * fps))
+    for joint in range(count):
+        heights, seen = positions[:, joint, 1], known[:, joint]
+        if not seen.any():
+            floor[:, joint] = np.percentile(heights, 5)
+            continue
+        index = np.flatnonzero(seen)
+        breaks = np.flatnonzero(np.diff(index) > 1)
+        at, height = [], []
+        for part in np.split(index, breaks + 1):
+            for side, frames_there in ((part[0], part[:near]), (part[-1], part[-near:])):
+                still = frames_there[slow[frames_there, joint]]
+                lowest = heights[frames_there].min()
+                still = still[heights[still] < lowest + 2 * HIGH]
+                at.append(side)
+                height.append(np.percentile(heights[still if len(still) else frames_there], 10))
+        floor[:, joint] = np.interp(np.arange(frames), at, height)
+    return floor
+
+
+def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray:
+    """(F, n) True while an ankle or toe (F, n, 3) is planted: slow (with hysteresis), low, and for long enough."""
+    speeds = metrics.speed(positions, fps)
+    low = positions[..., 1] < floor + HIGH
+    possible, certain = low & (speeds < FAST), low & (speeds < SLOW)
+    planted = np.zeros_like(low)
+    for joint in range(low.shape[1]):
+        for start, stop in runs(possible[:, joint]):
+            if certain[start:stop, joint].any() and stop - start >= SHORT * fps:
+                planted[start:stop, joint] = True
+    return planted
+
+
+def measure(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, float] | None:
+    """Slide (centimetres a second) and travel (metres) of the feet from the frame before start to stop.
+
+    None for skeletons whose feet are not known by name.
+    """
+    feet = ends(clip.skeleton)
+    if not feet:
+        return None
+    positions = clip.positions()[:, feet]
+    floor = local_floor(positions, known.positions(clip.skeleton)[:, feet], clip.fps)
+    part = slice(max(start - 1, 0), stop + 1)
+    return metrics.foot_slide(positions[part], clip.fps, floor[part]), metrics.foot_travel(positions[part])
+
+
+def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
+    """Hold the feet during contacts in the span, and keep them above the floor.
+
+    Only unobserved rotations of a leg move: where any of thigh, knee or ankle is observed, the leg is left
+    alone, and towards such frames the correction fades out. Bones never stretch.
+    """
+    skeleton = clip.skeleton
+    start, stop = span
+    free = [~known.rotation[:, [leg.thigh, leg.knee, leg.ankle]].any(axis=1) for leg in legs(skeleton)]
+    if not any(f[start:stop].any() for f in free):
+        return clip
+    rotation = clip.rotation.copy()
+    turned, placed = clip.kinematics()
+    seen = known.positions(skeleton)
+    inside = np.zeros(len(clip), bool)
+    inside[start:stop] = True
+    for leg, movable in zip(legs(skeleton), free):
+        movable = movable & inside
+        if not movable.any():
+            continue
+        feet = placed[:, [leg.ankle, leg.toe]]
+        floor = local_floor(feet, seen[:, [leg.ankle, leg.toe]], clip.fps)
+        planted = contacts(feet, floor, clip.fps)
+        shift = _hold(feet, planted, movable, clip.fps)
+        shift[..., 1] += _lift((floor - SINK - feet[..., 1] - shift[..., 1]).max(axis=1))[:, None]
+        shift *= _envelope(movable, clip.fps)[:, None, None]
+        moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
+        if moved.size:
+            rotation[moved] = _reach(
+                skeleton, leg, rotation[moved], turned[moved], placed[moved], feet[moved] + shift[moved]
+            )
+    return clip.with_motion(rotation, clip.translation)
+
+
+def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float) -> np.ndarray:
+    """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
+
+    feet: (F, 2, 3); planted: (F, 2). A contact that goes on in observed frames is held where it is at the seam
+    (between the two places, when it does so at both ends), any other one at its mean. Outside of a contact the
+    shift fades; where only one of the two is held, the other moves with it.
+    """
+    frames = len(feet)
+    blend = max(2, round(BLEND * fps))
+    time = np.arange(frames)
+    shifts, shares = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
+    for joint in range(2):
+        held = [run for run in runs(planted[:, joint]) if movable[slice(*run)].any()]
+        for k, (start, stop) in enumerate(held):
+            inside = np.flatnonzero(movable[start:stop]) + start
+            first, last = inside[0], inside[-1]
+            before = feet[first - 1, joint] if first > start else None
+            after = feet[last + 1, joint] if last < stop - 1 else None
+            mean = feet[inside, joint].mean(axis=0)
+            if before is None and after is None:
+                anchor = np.broadcast_to(mean, (frames, 3))
+            else:
+                ends = (before if before is not None else after, after if after is not None else before)
+                share = ramp((time - first + 1) / (last - first + 2))[:, None]
+                anchor = (1 - share) * ends[0] + share * ends[1]
+            # No further than half way to the neighbouring contacts, so that their shifts do not add up.
+            left = min(blend, (start - held[k - 1][1]) // 2 + 1) if k else blend
+            right = min(blend, (held[k + 1][0] - stop) // 2 + 1) if k + 1 < len(held) else blend
+            share = ramp(1 - (start - time) / (left + 1)) * ramp(1 - (time - stop + 1) / (right + 1))
+            inner = np.clip(time, start, stop - 1)
+            shifts[:, joint] += share[:, None] * (anchor[inner] - feet[inner, joint])
+            shares[:, joint] = np.maximum(shares[:, joint], share)
+    shifts[..., 1] = 0.0
+    other = shifts[:, ::-1]
+    return shifts + (1 - shares)[..., None] * other
+
+
+def _lift(depth: np.ndarray) -> np.ndarray:
+    """How far to lift what lies `depth` below the floor: max(depth, 0) with a rounded corner."""
+    return np.where(depth > SINK, depth, np.maximum(depth + SINK, 0.0) ** 2 / (4 * SINK))
+
+
+def _envelope(movable: np.ndarray, fps: float) -> np.ndarray:
+    """(F,) 0 where nothing may move, growing smoothly to 1 away from there; ends of the clip are no seam."""
+    frames = len(movable)
+    blend = max(2.0, BLEND * fps)
+    envelope = np.zeros(frames)
+    for start, stop in runs(movable):
+        time = np.arange(start, stop)
+        since = (time - start + 1) / blend if start > 0 else np.ones(len(time))
+        left = (stop - time) / blend if stop < frames else np.ones(len(time))
+        envelope[start:stop] = ramp(since) * ramp(left)
+    return envelope
+
+
+def _reach(
+    skeleton: Skeleton, leg: Leg, rotation: np.ndarray, turned: np.ndarray, placed: np.ndarray, goal: np.ndarray
+) -> np.ndarray:
+    """Local rotations (F, J, 4) with which ankle and toe reach `goal` (F, 2, 3) as far as the leg is long.
+
+    Two bones: the knee bends or straightens in its own plane until hip and ankle are as far apart as they should
+    be, the thigh turns the ankle there by the shortest way, and the foot keeps its direction or turns its toe to
+    its goal.
+    """
+    hip, knee, ankle, toe = (placed[:, j] for j in (leg.thigh, leg.knee, leg.ankle, leg.toe))
+    thigh, shin = knee - hip, ankle - knee
+    a, b = (np.linalg.norm(v, axis=-1) for v in (thigh, shin))
+    now = np.linalg.norm(ankle - hip, axis=-1)
+    wanted = np.linalg.norm(goal[:, 0] - hip, axis=-1)
+    # Close to full length the knee is slowed down; a leg that already is as straight may stay so.
+    distance = np.clip(now + _soft(wanted, a + b) - _soft(now, a + b), np.abs(a - b) + 1e-4, a + b)
+    # The knee's axis; a straight one has none of its own and takes the one across thigh and foot.
+    axis = rotations.cross(thigh, shin) / (a * b)[:, None]
+    axis = rotations.normalize(axis + 0.05 * rotations.normalize(rotations.cross(toe - ankle, thigh)))
+
+    def corner(left: np.ndarray, right: np.ndarray, across: np.ndarray) -> np.ndarray:
+        cosine = (left**2 + right**2 - across**2) / (2 * left * right)
+        return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+    at_hip = corner(a, distance, b) - corner(a, now, b)
+    at_knee = corner(a, b, now) - corner(a, b, distance)
+    of_thigh = rotations.exp(-at_hip[:, None] * axis)
+    of_shin = rotations.exp((at_knee - at_hip)[:, None] * axis)
+    bent = rotations.rotate(of_thigh, thigh) + rotations.rotate(of_shin, shin)
+    swing = rotations.between(bent, goal[:, 0] - hip)
+    of_thigh, of_shin = rotations.multiply(swing, of_thigh), rotations.multiply(swing, of_shin)
+    # The direction of the foot only: what the ankle falls short of, the toe falls short of, too.
+    of_foot = rotations.between(toe - ankle, goal[:, 1] - goal[:, 0])
+
+    done = rotation.copy()
+    change = {leg.thigh: of_thigh, leg.knee: of_shin, leg.ankle: of_foot}
+    above = rotations.identity(len(rotation), like=rotation)
+    for joint, turn in change.items():
+        # In the world the joint turns by `turn` and its parent by `above`: the rest is its own.
+        parent = rotations.multiply(above, turned[:, skeleton.parents[joint]])
+        turn_here = rotations.multiply(turn, turned[:, joint])
+        done[:, joint] = rotations.normalize(rotations.multiply(rotations.conjugate(parent), turn_here))
+        above = turn
+    return done
+
+
+def _soft(distance: np.ndarray, length: np.ndarray) -> np.ndarray:
+    """The distance, slowed down over the last 3 % of the leg's length, which it never passes."""
+    start = 0.97 * length
+    over = np.maximum(distance - start, 0.0)
+    room = length - start
+    return np.minimum(distance, start) + room * (1.0 - np.exp(-over / room))

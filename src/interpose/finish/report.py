@@ -1,0 +1,121 @@
+"""What the finishing did: where each value comes from, and a report per gap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.methods.protocol import Raw
+
+
+class Provenance(IntEnum):
+    """Where a joint's values in a frame come from."""
+
+    OBSERVED = 0
+    METHOD = 1  # what the method said (solved, where it speaks positions)
+    CORRECTED = 2  # the method's, changed by seams or feet
+    FALLBACK = 3  # the simpler method's
+
+
+@dataclass(frozen=True)
+class GapReport:
+    """One gap. Lengths are in the units named; None where there is nothing to measure.
+
+    Attributes:
+        start, stop: frames start to stop - 1.
+        joints: the joints whose values are missing; None when it is the whole pose.
+        method: the method that filled it, by name: the fallback's when it fell back.
+        model: the trained model, if the method has one.
+        solve_error: cm, mean distance of the solved pose from the positions that the method gave.
+        seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of what
+            the method said and of what is returned.
+        seam_limit: cm a frame squared, the 95th percentile of the clip's own velocity jumps.
+        bone_deviation: cm, largest change of a bone's length.
+        foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
+        foot_travel: m, length of the way of the feet.
+        drift: cm, of the root trajectory before it was spread over the gap.
+        notes: one sentence each: what fell back and why, what stays above a limit.
+    """
+
+    start: int
+    stop: int
+    joints: tuple[str, ...] | None
+    method: str
+    model: str | None = None
+    solve_error: float | None = None
+    seam_before: float | None = None
+    seam_after: float | None = None
+    seam_limit: float | None = None
+    bone_deviation: float = 0.0
+    foot_slide: float | None = None
+    foot_slide_before: float | None = None
+    foot_travel: float | None = None
+    drift: float | None = None
+    notes: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        where = f"{self.start}:{self.stop}"
+        if self.joints is not None:
+            where += " " + ",".join(self.joints[:4]) + (",..." if len(self.joints) > 4 else "")
+        parts = [f"by {self.method}" + (f" ({self.model})" if self.model else "")]
+        if self.solve_error is not None:
+            parts.append(f"solved within {self.solve_error:.2f} cm")
+        if self.seam_after is not None:
+            above = f" (limit {self.seam_limit:.2f})" if self.seam_limit is not None else ""
+            parts.append(f"seam {self.seam_before:.2f} -> {self.seam_after:.2f}{above} cm/frame^2")
+        parts.append(f"bones within {self.bone_deviation:.2g} cm")
+        if self.foot_slide is not None:
+            parts.append(f"feet slide {self.foot_slide:.1f} cm/s, travel {self.foot_travel:.2f} m")
+        if self.drift is not None:
+            parts.append(f"drift {self.drift:.1f} cm")
+        return "\n    ".join([f"gap {where}: " + "; ".join(parts), *self.notes])
+
+
+@dataclass(frozen=True)
+class Report:
+    """All gaps of a clip, in order of time."""
+
+    method: str
+    gaps: list[GapReport] = field(default_factory=list)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types only, ready for JSON."""
+        return {"method": self.method, "gaps": [_plain(asdict(gap)) for gap in self.gaps]}
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self.gaps)) or "nothing is missing"
+
+
+@dataclass(frozen=True, eq=False)
+class Completion:
+    """A completed clip and what there is to know about it.
+
+    Attributes:
+        clip: the finished clip.
+        raw: what the method itself said, before anything was corrected (what papers' tables use).
+        provenance: (F, J) int8, codes of `Provenance`.
+        report: a report per gap.
+    """
+
+    clip: Clip
+    raw: Raw
+    provenance: np.ndarray
+    report: Report
+
+
+def _plain(value: Any) -> Any:
+    """Dictionaries, lists, text and numbers; what is no number becomes None."""
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

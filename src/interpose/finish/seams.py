@@ -1,0 +1,236 @@
+"""No pop: fade what a method says differently from what is observed, and measure what is left.
+
+A *run* is a range of frames in which one value is missing, a *span* one in which any is. What borders on a run
+is a *seam*. Everything is done in local rotations (from the right) and along the clip's axes in translations,
+so that a clip that is turned or shifted gives the same, turned or shifted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.evaluation import metrics
+from interpose.finish.solve import refine
+from interpose.finish.windows import runs
+from interpose.geometry import rotations
+from interpose.observation import Observation
+
+# Seconds over which a difference in value, and one in velocity, fade into a gap. A slope fades sooner: over a
+# long way it would carry the pose far off.
+VALUE_FADE, SLOPE_FADE = 0.75, 0.25
+# Seconds of observed motion from which the difference in velocity is taken: less is noise.
+MOMENT = 0.05
+# A method that differs by more than this at a seam (metres) has lost the motion, and is not faded but replaced.
+ABSURD = 0.5
+# Below this a difference in a local rotation (radians) or translation (metres) is none.
+EXACT = 1e-6
+# The limit of velocity jumps: a percentile of the clip's own, and at least this, in metres per second squared
+# (1 mm a frame squared at 30 fps).
+PERCENTILE, FLOOR = 95.0, 0.9
+# A jump that is brought below the limit is brought to this share of it.
+MARGIN = 0.85
+CHUNK = 4096
+
+
+def reach(fps: float) -> int:
+    """How many observed frames beside a run are read."""
+    return max(2, round(MOMENT * fps) + 1)
+
+
+def edges(known: Observation, translated: tuple[int, ...], span: tuple[int, int]) -> np.ndarray:
+    """The frames of a span's seams: the observed one at each end of every run, where it has both neighbours."""
+    found: set[int] = set()
+    for seen in (known.rotation, known.translation[:, list(translated)]):
+        for start, stop in _shared(seen, span):
+            found |= {start - 1, stop}
+    return np.array(sorted(f for f in found if 0 < f < len(known.rotation) - 1), int)
+
+
+def limit(clip: Clip, observation: Observation) -> float | None:
+    """The 95th percentile of the clip's own velocity jumps, in metres per frame squared.
+
+    Over all joints and all frames whose position is observed together with both neighbours'; None when there
+    are none, as between lone keys.
+    """
+    pooled = []
+    for start in range(0, max(len(clip) - 2, 0), CHUNK):
+        stop = min(start + CHUNK + 2, len(clip))
+        known = observation.slice(start, stop).positions(clip.skeleton)
+        known = known[:-2] & known[1:-1] & known[2:]
+        if known.any():
+            part = metrics.acceleration(clip.slice(start, stop).positions())
+            pooled.append(part[known].astype(np.float32))
+    if not pooled:
+        return None
+    return max(float(np.percentile(np.concatenate(pooled), PERCENTILE)), FLOOR / clip.fps**2)
+
+
+@dataclass(frozen=True)
+class Fade:
+    """What is added at one seam of a run, for the values that share it.
+
+    Attributes:
+        value: (n, 3) how much the observed motion differs from the raw one at the observed frame.
+        slope: (n, 3) how much its velocity differs, a frame, counted into the run.
+        at_first: the slope is what is to be added at the first frame of the run.
+    """
+
+    value: np.ndarray
+    slope: np.ndarray
+    at_first: bool = False
+
+    def at(self, distance: np.ndarray, room: int, fps: float) -> np.ndarray:
+        """(m, n, 3) what is left of it `distance` frames (m,) into a run whose other seam is `room` away."""
+        wide = min(float(room), max(VALUE_FADE * fps, 2.0))
+        tight = min(float(room), max(SLOPE_FADE * fps, 2.0))
+        x, y = (np.clip(distance / window, 0, 1)[:, None, None] for window in (wide, tight))
+        slope = self.slope / (1 - 1 / tight) ** 2 if self.at_first else self.slope
+        # The two cubic Hermite functions that start with value 1 and with slope 1.
+        return (2 * x**3 - 3 * x**2 + 1) * self.value + (y**3 - 2 * y**2 + y) * tight * slope
+
+
+def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Clip:
+    """Ease the raw motion of the span into the observed one on both sides, value by value.
+
+    Args:
+        raw: (F) frames; at observed frames what the method says of them, at least `reach` frames on each side.
+        base: (F) frames, the observed motion.
+        known: what is observed.
+        span: the frames in which anything may be changed.
+    """
+
+    def measure(values: Values, slots: list[int], edge: int, way: int) -> Fade:
+        mine, theirs = values(raw)[:, slots], values(base)[:, slots]
+        seen, back = values(known)[:, slots[0]], 0
+        while back < reach(raw.fps) - 1 and _is_seen(seen, edge - way * (back + 1)):
+            back += 1
+        far = edge - way * back
+        value = offset(mine[edge], theirs[edge])
+        return Fade(value, (value - offset(mine[far], theirs[far])) / max(back, 1))
+
+    return _add(raw, known, span, measure)
+
+
+def jumps(motion: Clip, known: Observation, edge: int) -> np.ndarray:
+    """(J, 3) velocity jumps of all joints at an observed frame beside a gap, in metres per frame squared.
+
+    Zero for joints whose positions are observed around it: what they do is no seam.
+    """
+    near = slice(edge - 1, edge + 2)
+    jump = np.diff(motion.slice(edge - 1, edge + 2).positions(), 2, axis=0)[0]
+    return np.where(known.slice(near.start, near.stop).positions(motion.skeleton).all(axis=0)[:, None], 0.0, jump)
+
+
+def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
+    """Bring velocity jumps at the seams of the span below the limit (metres per frame squared).
+
+    The first missing pose is turned, as little as possible, so that joints that jump too far go on more like
+    they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
+    """
+    nudges: dict[tuple[int, int], Clip] = {}
+    for edge in edges(known, motion.translated, span):
+        jump = jumps(motion, known, edge)
+        size = np.linalg.norm(jump, axis=-1, keepdims=True)
+        excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
+        if not excess.any():
+            continue
+        for way in (1, -1):
+            at = slice(edge + way, edge + way + 1)
+            # What is missing on both sides of a lone key shares the work.
+            part = 0.5 if not known.frames[edge - way] and not known.frames[edge + way] else 1.0
+            fresh = Observation(
+                known.rotation[at] | ~known.rotation[edge], known.translation[at] | ~known.translation[edge]
+            )
+            if fresh.complete:
+                continue
+            one = motion.slice(at.start, at.stop)
+            nudges[edge, way] = refine(one, fresh, tuple(range(len(motion.skeleton))), one.positions() - part * excess)
+    if not nudges:
+        return motion
+
+    def measure(values: Values, slots: list[int], edge: int, way: int) -> Fade:
+        none = np.zeros((len(slots), 3))
+        if (edge, way) not in nudges:
+            return Fade(none, none)
+        at = edge + way
+        nudge = offset(values(motion)[at, slots], values(nudges[edge, way])[0, slots])
+        return Fade(none, nudge, at_first=True)
+
+    return _add(motion, known, span, measure)
+
+
+Values = Callable[[Clip | Observation], np.ndarray]
+Measure = Callable[[Values, list[int], int, int], Fade]
+
+
+def _add(motion: Clip, known: Observation, span: tuple[int, int], measure: Measure) -> Clip:
+    """The motion with a fade added at both ends of every run in the span."""
+
+    def moved(of: Clip | Observation) -> np.ndarray:
+        return of.translation if isinstance(of, Clip) else of.translation[:, list(motion.translated)]
+
+    def turned(of: Clip | Observation) -> np.ndarray:
+        return of.rotation
+
+    done = []
+    for values in (turned, moved):
+        result = values(motion).copy()
+        for (start, stop), slots in _shared(values(known), span).items():
+            added = np.zeros((stop - start, len(slots), 3))
+            for edge, way in ((start - 1, 1), (stop, -1)):
+                if 0 <= edge < len(motion):
+                    distance = (np.arange(start, stop) - edge) * way
+                    added += measure(values, slots, edge, way).at(distance, stop - start + 1, motion.fps)
+            part = result[start:stop, slots]
+            result[start:stop, slots] = (
+                part + added if values is moved else rotations.multiply(part, rotations.exp(added))
+            )
+        done.append(result)
+    return motion.with_motion(*done)
+
+
+def _is_seen(seen: np.ndarray, frame: int) -> bool:
+    return 0 <= frame < len(seen) and bool(seen[frame])
+
+
+def _shared(known: np.ndarray, span: tuple[int, int]) -> dict[tuple[int, int], list[int]]:
+    """{run: columns of `known` (F, n) that are missing in it}, for the runs inside the span."""
+    found: dict[tuple[int, int], list[int]] = {}
+    for column in range(known.shape[1]):
+        for start, stop in runs(~known[slice(*span), column]):
+            found.setdefault((start + span[0], stop + span[0]), []).append(column)
+    return found
+
+
+def offset(raw: np.ndarray, base: np.ndarray) -> np.ndarray:
+    """How the observed values differ from the raw ones: (..., 3) from quaternions (..., 4) or vectors (..., 3)."""
+    if raw.shape[-1] == 3:
+        return base - raw
+    return rotations.log(rotations.multiply(rotations.conjugate(raw), base))
+
+
+def difference(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> tuple[float, float]:
+    """How far a method is from what is observed beside the runs of a span: by values, and by positions.
+
+    Returns the largest difference of a value (radians or metres) and of a joint's position (metres).
+    """
+    columns, values = list(raw.translated), 0.0
+    frames: set[int] = set()
+    for mine, theirs, seen in (
+        (raw.rotation, base.rotation, known.rotation),
+        (raw.translation, base.translation, known.translation[:, columns]),
+    ):
+        for (start, stop), slots in _shared(seen, span).items():
+            for edge in {start - 1, stop} & set(range(len(mine))):
+                values = max(values, float(np.abs(offset(mine[edge, slots], theirs[edge, slots])).max()))
+                frames.add(edge)
+    if not frames:
+        return 0.0, 0.0
+    at = sorted(frames)
+    apart = raw.with_motion(raw.rotation[at], raw.translation[at]).positions()
+    apart = apart - base.with_motion(base.rotation[at], base.translation[at]).positions()
+    return values, float(np.linalg.norm(apart, axis=-1)[known.positions(raw.skeleton)[at]].max(initial=0.0))
