@@ -102,7 +102,10 @@ def angle(a: Array, b: Array) -> Array:
     """The angle in radians (0 to pi) between the rotations `a` and `b` (..., 4): shape (...)."""
     xp = array_namespace(a, b)
     difference = log(multiply(conjugate(a), b))
-    return xp.sqrt(xp.sum(difference * difference, axis=-1))
+    square = xp.sum(difference * difference, axis=-1)
+    # At zero the root has no slope; its gradient there is taken as zero.
+    same = square == 0
+    return xp.where(same, square, xp.sqrt(xp.where(same, xp.ones_like(square), square)))
 
 
 def slerp(a: Array, b: Array, t: Array) -> Array:

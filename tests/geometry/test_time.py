@@ -1,0 +1,169 @@
+"""Interpolation in time: through the samples, with the given velocities, the short way; resampling."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.geometry import rotations, time
+
+RATES = [(120, 30, 40), (30, 24, 31), (24, 60, 10), (25, 29.97, 26)]
+
+
+def wobble(frames: int = 40, joints: int = 2, seed: int = 0) -> np.ndarray:
+    """Smooth rotations (F, J, 4)."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(frames)[:, None, None] / 30
+    vectors = sum(rng.normal(scale=0.5, size=(1, joints, 3)) * np.sin((k + 1) * t + k) for k in range(3))
+    return rotations.exp(vectors)
+
+
+def clip(frames: int = 40, fps: float = 30, seed: int = 0) -> Clip:
+    skeleton = Skeleton(("root", "bone"), (-1, 0), np.array([[0, 0, 0], [0, 1, 0]]))
+    t = np.arange(frames) / 30
+    root = np.stack([np.sin(t), 1 + 0.1 * np.cos(3 * t), t], axis=-1)[:, None]
+    return Clip(skeleton, wobble(frames, seed=seed), root, fps)
+
+
+def apart(a: np.ndarray, b: np.ndarray) -> float:
+    return float(rotations.angle(a, b).max())
+
+
+def test_sampling_at_and_between_samples(kind):
+    values = np.random.default_rng(0).normal(size=(5, 2, 3))
+    times = kind.array([0.0, 1.0, 1.25, 4.0, -1.0, 9.0])
+    got = kind.numpy(time.sample(kind.array(values), times))
+    np.testing.assert_allclose(got[[0, 1, 3, 4, 5]], values[[0, 1, 4, 0, 4]], atol=kind.tolerance)
+    np.testing.assert_allclose(got[2], 0.75 * values[1] + 0.25 * values[2], atol=kind.tolerance)
+    q = wobble(5)
+    got = time.sample_rotations(kind.array(q), times)
+    expected = rotations.slerp(q[1], q[2], np.array(0.25))
+    np.testing.assert_allclose(abs((kind.numpy(got)[2] * expected).sum(-1)), 1, atol=kind.tolerance)
+
+
+@pytest.mark.parametrize("reach", [None, 3.0, 100.0])
+def test_hermite_meets_values_and_velocities(kind, reach):
+    a, b, va, vb = np.random.default_rng(0).normal(size=(4, 3))
+    length, step = 12.0, 1e-2 if kind.tolerance > 1e-9 else 1e-5
+    t = kind.array([0.0, step, length - step, length])
+    ends = [kind.array(x)[None] for x in (a, b, va, vb)]
+    p = kind.numpy(time.hermite(*ends, t, kind.array([length]), reach))
+    np.testing.assert_allclose(p[[0, 3]], [a, b], atol=4 * kind.tolerance)
+    np.testing.assert_allclose((p[1] - p[0]) / step, va, atol=2 * step + 1e3 * kind.tolerance)
+    np.testing.assert_allclose((p[3] - p[2]) / step, vb, atol=2 * step + 1e3 * kind.tolerance)
+
+
+def test_hermite_without_reach_is_the_textbook_cubic():
+    a, b, va, vb = np.random.default_rng(1).normal(size=(4, 3))
+    length, s = 7.0, np.linspace(0, 1, 20)[:, None]
+    cubic = (
+        (2 * s**3 - 3 * s**2 + 1) * a
+        + (3 * s**2 - 2 * s**3) * b
+        + (s**3 - 2 * s**2 + s) * va * length
+        + (s**3 - s**2) * vb * length
+    )
+    got = time.hermite(a, b, va, vb, s[:, 0] * length, np.full(20, length))
+    np.testing.assert_allclose(got, cubic, atol=1e-12)
+
+
+@pytest.mark.parametrize("reach", [None, 3.0])
+def test_rotations_meet_values_and_velocities(reach):
+    rng = np.random.default_rng(2)
+    a, b = wobble(2, seed=3)[:, 0]
+    va, vb = rng.normal(scale=0.2, size=(2, 3))
+    length, step = 12.0, 1e-5
+    t = np.array([0.0, step, length - step, length])
+    q = time.hermite_rotations(a, b, va, vb, t, np.full(4, length), reach)
+    assert apart(q[[0, 3]], np.stack([a, b])) < 1e-12
+    np.testing.assert_allclose(time.steps(q)[0] / step, va, atol=1e-4)
+    np.testing.assert_allclose(time.steps(q)[2] / step, vb, atol=1e-4)
+
+
+def test_rotations_follow_a_turn_of_the_input_and_can_be_reversed():
+    rng = np.random.default_rng(2)
+    a, b = wobble(2, seed=3)[:, 0]
+    va, vb = rng.normal(scale=0.2, size=(2, 3))
+    world = rotations.exp(np.array([1.0, -2.0, 0.5]))
+    t, length = np.linspace(0, 12, 30), np.full(30, 12.0)
+    q = time.hermite_rotations(a, b, va, vb, t, length, 5.0)
+    turn = rotations.multiply
+    turned = time.hermite_rotations(turn(world, a), turn(world, b), va, vb, t, length, 5.0)
+    assert apart(turned, turn(world, q)) < 1e-7
+    backwards = time.hermite_rotations(b, a, -vb, -va, t, length, 5.0)
+    assert apart(backwards[::-1], q) < 1e-7
+
+
+def test_rotations_take_the_short_way():
+    a = rotations.exp(np.array([0.0, 0.1, 0.0]))
+    t, length, rest = np.arange(9.0), np.full(9, 8.0), np.zeros(3)
+    q = time.hermite_rotations(a, -rotations.exp(np.array([0.0, 0.5, 0.0])), rest, rest, t, length)
+    assert rotations.angle(a, q).max() < 0.4 + 1e-9
+
+
+def test_a_far_reach_swings_out_and_a_near_one_does_not():
+    a = b = np.zeros(1)
+    fast, rest = np.ones(1), np.zeros(1)
+    t, length = np.linspace(0, 60, 200), np.full(200, 60.0)
+    assert abs(time.hermite(a, b, fast, rest, t, length)).max() > 8
+    assert abs(time.hermite(a, b, fast, rest, t, length, 12.0)).max() < 12 * 4 / 27 + 1e-3
+
+
+def test_smooth_sampling_goes_through_samples_with_continuous_velocity():
+    q = wobble(10)
+    times = np.arange(0, 9.0001, 0.01)
+    fine = time.sample_rotations_smooth(q, times)
+    assert apart(fine[::100], q) < 1e-9
+    jumps = np.linalg.norm(np.diff(time.steps(fine), axis=0), axis=-1).max()
+    straight = np.linalg.norm(np.diff(time.steps(time.sample_rotations(q, times)), axis=0), axis=-1).max()
+    assert jumps < 0.1 * straight
+    values = np.cumsum(np.random.default_rng(0).normal(size=(10, 3)), axis=0)
+    np.testing.assert_allclose(time.sample_smooth(values, times)[::100], values, atol=1e-12)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_resampling_there_and_back(smooth):
+    short = clip(40)
+    up = time.resample(short, 120, smooth)
+    assert len(up) == 39 * 4 + 1
+    assert up.fps == 120
+    back = time.resample(up, 30)
+    # Shared frames are the same numbers.
+    assert (back.rotation == short.rotation).all()
+    assert (back.translation == short.translation).all()
+    assert back.fps == 30
+
+
+@pytest.mark.parametrize(("old", "new", "frames"), RATES)
+def test_resampling_keeps_the_duration(old, new, frames):
+    before = clip(frames, fps=old)
+    after = time.resample(before, new)
+    first, last = (frames - 1) / old, (len(after) - 1) / new
+    assert first - 1 / new < last <= first + 1e-9
+    assert (after.rotation[0] == before.rotation[0]).all()
+    moment = 0.5 * last
+    here = time.sample(before.translation, np.array([moment * old]))
+    np.testing.assert_allclose(time.sample(after.translation, np.array([moment * new])), here, atol=2e-3)
+
+
+def test_a_rounded_frame_time_means_the_rate_it_stands_for():
+    rounded = clip(2000, fps=1 / 0.033333)
+    up = time.resample(rounded, 60)
+    assert len(up) == 2 * 1999 + 1
+    assert (up.rotation[::2] == rounded.rotation).all()
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+def test_resampling_tiny_clips(frames):
+    tiny = clip(frames)
+    for smooth in (False, True):
+        up = time.resample(tiny, 90, smooth)
+        assert len(up) == 3 * (frames - 1) + 1
+        assert (up.rotation[-1] == tiny.rotation[-1]).all()
+
+
+def test_resampling_to_nothing_is_refused():
+    for fps in (0, -30, float("nan")):
+        with pytest.raises(RequestError, match="above zero"):
+            time.resample(clip(), fps)
