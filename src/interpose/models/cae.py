@@ -37,9 +37,11 @@ class Autoencoder(nn.Module):
             nn.ModuleList([nn.ConvTranspose2d(b, b, 3, 2, 1), nn.ConvTranspose2d(b, a, 3, 1, 1)])
             for a, b in zip(reversed((1, *channels[:-1])), reversed(channels))
         )
+        # Xavier as in the paper; the gain of its leaky ReLU keeps a deep stack from fading out at the start.
+        gain = nn.init.calculate_gain("leaky_relu", 0.01)
         for module in self.modules():
             if isinstance(module, nn.Conv2d | nn.ConvTranspose2d):
-                nn.init.xavier_uniform_(module.weight)
+                nn.init.xavier_uniform_(module.weight, gain)
                 assert module.bias is not None
                 nn.init.zeros_(module.bias)
 

@@ -27,6 +27,10 @@ def pick_device() -> torch.device:
     return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if gpu else torch.device("cpu")
 
 
+def processes() -> int:
+    return dist.get_world_size() if dist.is_initialized() else 1
+
+
 def rank() -> int:
     return dist.get_rank() if dist.is_initialized() else 0
 
@@ -118,7 +122,7 @@ class Trainer:
         flat = torch.cat([spent, *(g.flatten() for g in gradients)])
         dist.all_reduce(flat)
         for gradient, total in zip(gradients, flat[1:].split([g.numel() for g in gradients])):
-            gradient.copy_(total.view_as(gradient) / dist.get_world_size())
+            gradient.copy_(total.view_as(gradient) / processes())
         return float(flat[0])
 
     def run(self) -> nn.Module:
