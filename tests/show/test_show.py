@@ -17,7 +17,7 @@ from interpose.errors import RequestError
 from interpose.observation import Gap
 from interpose.show import Take, figure, line_plot, player, strip
 from interpose.show.player import decode
-from interpose.show.strip import choose_frames, excerpt, view
+from interpose.show.strip import choose_frames, excerpt, slots, view
 
 JOINTS = {
     "Hips": (-1, 0, 0.95, 0),
@@ -175,6 +175,17 @@ def test_frames_are_denser_in_the_gap_and_long_clips_show_its_surroundings():
     assert len(frames) == 14
     assert len(inside) / 60 > 1.5 * (14 - len(inside)) / 40
     assert np.ptp(np.diff(inside)) <= 1, "even inside the gap"
+
+
+def test_slots_hold_their_figures_and_are_even_where_they_can_be():
+    scale, edges = slots(np.array([0.5, 0.5, 2.0, 0.6]), 100, 500)
+    assert scale == 100
+    widths = np.diff(edges)
+    assert np.allclose([edges[0], edges[-1]], [0, 500])
+    assert np.allclose(widths, [97.333, 97.333, 208, 97.333], atol=0.01)
+    assert np.allclose(np.diff(slots(np.full(14, 0.5), 100, 1200)[1]), 1200 / 14)
+    scale, edges = slots(np.full(14, 9.0), 100, 1200)
+    assert np.isclose(edges[-1], 1200), "too wide for any scale: they overlap, inside the picture"
 
 
 # ---- player

@@ -16,6 +16,9 @@ OBSERVED = "#8b929c"
 INK, FAINT, PAPER, LINE, SHADE = "#1f2328", "#656d76", "#ffffff", "#d5dae1", "#fff3dc"
 PITCH = np.radians(7.0)
 
+# Pixels a metre, at most and at least; pixels a slot needs for its label; metres of drift that it holds.
+LARGE, SMALL, NARROW, DRIFT = 108.0, 60.0, 58.0, 0.5
+
 
 def choose_frames(gaps: Sequence[Span], start: int, stop: int, count: int) -> list[int]:
     """`count` frames (fewer in short clips) out of start to stop - 1, about three times denser in gaps.
@@ -76,6 +79,25 @@ def view(towards: np.ndarray, travels: bool) -> np.ndarray:
     right = np.cross(figure.UP, viewer)
     viewer = np.cos(PITCH) * viewer + np.sin(PITCH) * figure.UP
     return np.stack([right, np.cross(viewer, right), viewer])
+
+
+def slots(widths: np.ndarray, largest: float, room: float) -> tuple[float, np.ndarray]:
+    """Scale (pixels a metre) and edges (n + 1,) in pixels of side-by-side slots for figures.
+
+    widths: (n,) metres. The scale is the largest one up to `largest` at which all fit into `room`
+    pixels; wide motions stop at SMALL and then overlap a little.
+    """
+    scale = largest
+    while scale > min(SMALL, largest) and np.maximum(widths * scale + 8, NARROW).sum() > room:
+        scale *= 0.98
+    each = np.maximum(widths * scale + 8, NARROW)
+    each *= min(1.0, room / each.sum())
+    # What is left over widens the narrowest slots, so that most are equal: the level at which they fit.
+    order = np.sort(each)
+    levels = [(room - order[i:].sum()) / i for i in range(1, len(each) + 1)]
+    level = next(v for v, above in zip(levels, [*order[1:], np.inf]) if v <= above)
+    each = np.maximum(each, level)
+    return scale, np.concatenate([[0.0], np.cumsum(each)])
 
 
 def _seconds(value: float) -> str:
@@ -175,22 +197,22 @@ def strip(
         centers = [drawn.head_center(np.asarray(take.positions, float)[shown]) for take in takes]
         heads = (np.stack(centers) - middle[:, 0]) @ camera.T
 
-    slot = (WIDTH - LEFT - RIGHT) / len(shown)
-    wide = float(np.percentile(np.ptp(poses[..., 0], axis=2), 75))
     tall = float(
         (poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())) + 0.12
     )
-    scale = float(np.clip(min(1.12 * slot / max(wide, 1e-6), 170 / max(tall, 1e-6)), 10, 108))
+    # How far each figure reaches to either side; a take that drifts far away may leave its slot.
+    low, high = poses[..., 0].min(axis=2) - 0.06, poses[..., 0].max(axis=2) + 0.06
+    low = np.maximum(low.min(axis=0), low[0] - DRIFT)
+    high = np.minimum(high.max(axis=0), high[0] + DRIFT)
+    scale, edges = slots(high - low, min(LARGE, 170 / max(tall, 1e-6)), WIDTH - LEFT - RIGHT)
+    edges += LEFT
     below = max(0.0, float(-np.percentile(poses[..., 1], 0.5))) * scale
     row = tall * scale + below + 34
     height = TOP + row * len(takes) + BOTTOM
-    center = [LEFT + slot * (i + 0.5) for i in range(len(shown))]
-    # Wide poses in the outer slots move inwards, in all rows alike.
-    reach = poses[..., 0] * scale
-    stands = [
-        float(np.clip(x, 10 - reach[:, i].min(), max(WIDTH - 10 - reach[:, i].max(), 10 - reach[:, i].min())))
-        for i, x in enumerate(center)
-    ]
+    center = (edges[:-1] + edges[1:]) / 2
+    # Nothing leaves the picture: drifting takes push their figure inwards, in all rows alike.
+    first, last = poses[..., 0].min(axis=(0, 2)) * scale, poses[..., 0].max(axis=(0, 2)) * scale
+    stands = np.maximum(np.minimum(center - (low + high) / 2 * scale, WIDTH - 10 - last), 10 - first)
 
     svg = [
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0f}" width="{WIDTH}" '
@@ -216,7 +238,7 @@ def strip(
         within = [i for i, f in enumerate(shown) if gap_start <= f < gap_stop]
         if not within:
             continue
-        x, wide_px = LEFT + slot * within[0], slot * len(within)
+        x, wide_px = edges[within[0]], edges[within[-1] + 1] - edges[within[0]]
         svg.append(
             f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide_px:.1f}" '
             f'height="{bottom - TOP + 22:.1f}" '
