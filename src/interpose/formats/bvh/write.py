@@ -57,6 +57,12 @@ def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str
     pattern = motion.raw(len(motion) - 1, len(motion)).rstrip() + line_end
     lost = _Lost(np.zeros(len(clip.skeleton)), np.zeros(len(clip.skeleton)))
     previous = np.zeros(motion.channels)
+
+    def kept(start: int, stop: int) -> bytes:
+        """The original text of some frames. The last one may lack a line end that it needs now."""
+        text = motion.raw(start, stop) if start < stop else b""
+        return text.rstrip() + line_end if text and stop == len(motion) < len(clip) else text
+
     for start in range(0, len(clip), motion.chunk):
         stop = min(start + motion.chunk, len(clip))
         known = max(0, min(stop, len(motion)) - start)
@@ -69,18 +75,13 @@ def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str
         values = np.round(values, style.decimals) + 0.0  # no negative zeros
         # What comes out the same to the last written decimal did not change.
         fresh[:known] &= np.abs(values[:known] - old) > 0.5001 * 10.0**-style.decimals
-        rows = np.flatnonzero(fresh.any(axis=1)).tolist()
         done = 0
-        for row in rows:
-            stream.write(motion.raw(start + done, start + row) if done < min(row, known) else b"")
-            text = motion.raw(start + row, start + row + 1) if row < known else pattern
-            text = _exchange(text, values[row], fresh[row], style)
-            # More frames follow than the file had: its last one may lack a line end.
-            stream.write(text.rstrip() + line_end if start + row == len(motion) - 1 < len(clip) - 1 else text)
+        for row in np.flatnonzero(fresh.any(axis=1)).tolist():
+            stream.write(kept(start + done, start + min(row, known)))
+            text = kept(start + row, start + row + 1) if row < known else pattern
+            stream.write(_exchange(text, values[row], fresh[row], style))
             done = row + 1
-        if done < known:
-            text = motion.raw(start + done, start + known)
-            stream.write(text.rstrip() + line_end if start + known == len(motion) < len(clip) else text)
+        stream.write(kept(start + done, start + known))
     return lost.notes(clip.skeleton.names)
 
 

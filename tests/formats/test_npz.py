@@ -1,0 +1,104 @@
+"""interpose's own arrays: exact, small, and safe to open."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+import pytest
+
+from interpose import formats
+from interpose.clip import Clip, Skeleton
+from interpose.errors import FileError, RequestError
+
+
+def some_clip():
+    rng = np.random.default_rng(1)
+    skeleton = Skeleton(
+        ("Wurzel", "Häňd", "c"),
+        (-1, 0, 1),
+        rng.standard_normal((3, 3)),
+        rng.standard_normal((3, 4)),
+        np.array([1, 2, 3.0]),
+    )
+    return Clip(skeleton, rng.standard_normal((5, 3, 4)), rng.standard_normal((5, 2, 3)), 29.97, (0, 2))
+
+
+def test_exact(tmp_path):
+    clip = some_clip()
+    formats.save(clip, tmp_path / "a.npz")
+    again = formats.load(tmp_path / "a.npz")
+    assert (again.skeleton.names, again.skeleton.parents) == (clip.skeleton.names, clip.skeleton.parents)
+    assert (again.fps, again.translated, again.name) == (29.97, (0, 2), "a")
+    for name in ("rest_translation", "rest_rotation", "rest_scale"):
+        np.testing.assert_array_equal(getattr(again.skeleton, name), getattr(clip.skeleton, name))
+    np.testing.assert_array_equal(again.rotation, clip.rotation)
+    np.testing.assert_array_equal(again.translation, clip.translation)
+    formats.save(again, tmp_path / "b.npz")
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
+def test_bvh_to_npz_and_back(cmu_walk, tmp_path):
+    formats.save(cmu_walk, tmp_path / "a.npz")
+    formats.save(formats.load(tmp_path / "a.npz"), tmp_path / "b.bvh")
+    again = formats.load(tmp_path / "b.bvh")
+    np.testing.assert_allclose(again.positions(), cmu_walk.positions(), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"rotation": np.full((5, 3, 4), np.nan)},
+        {"rotation": np.zeros((5, 2, 4))},
+        {"rotation": np.zeros((0, 3, 4)), "translation": np.zeros((0, 2, 3))},
+        {"rotation": np.array([{"a": 1}], dtype=object)},
+        {"rest_scale": np.full(3, np.nan)},
+        {"rest_translation": np.zeros((2, 3))},
+        {"names": np.array(["a", "a", "b"])},
+        {"parents": np.array([-1, 2, 1])},
+        {"translated": np.array([2])},
+        {"translated": np.array([0, 7])},
+        {"fps": np.array(0.0)},
+        {"fps": np.array([1.0, 2.0])},
+        {"version": np.array(99)},
+    ],
+)
+def test_contradictions(tmp_path, change):
+    formats.save(some_clip(), tmp_path / "a.npz")
+    with np.load(tmp_path / "a.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "b.npz", **(arrays | change))
+    with pytest.raises(FileError) as caught:
+        formats.load(tmp_path / "b.npz")
+    assert caught.value.why
+    assert caught.value.fix
+
+
+def test_damaged(tmp_path):
+    path = tmp_path / "a.npz"
+    formats.save(some_clip(), path)
+    whole = path.read_bytes()
+    rng = np.random.default_rng(2)
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileError):
+        formats.load(path)
+    for text in (b"", b"PK\x03\x04 no", b"HIERARCHY\n"):
+        path.write_bytes(text)
+        with pytest.raises(FileError):
+            formats.load(path)
+    for _ in range(100):
+        damaged = bytearray(whole)
+        for place in rng.integers(0, len(whole), 3):
+            damaged[place] = rng.integers(256)
+        path.write_bytes(bytes(damaged))
+        with contextlib.suppress(FileError):
+            assert len(formats.load(path)) > 0
+    np.savez(path, rotation=np.zeros(3))
+    with pytest.raises(FileError, match="no array"):
+        formats.load(path)
+
+
+def test_options_are_not_for_npz(tmp_path):
+    formats.save(some_clip(), tmp_path / "a.npz")
+    with pytest.raises(RequestError, match="unit"):
+        formats.load(tmp_path / "a.npz", unit="cm")
