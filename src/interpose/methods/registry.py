@@ -14,6 +14,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "zero-velocity": ("interpose.methods.classical", "ZeroVelocity"),
     "linear": ("interpose.methods.classical", "Linear"),
     "spline": ("interpose.methods.classical", "Spline"),
+    "cae": ("interpose.methods.cae", "Cae"),
 }
 
 # The entry-point group in which other packages offer methods: name = "package.module:Class".

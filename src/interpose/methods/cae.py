@@ -1,0 +1,115 @@
+"""The convolutional autoencoder (Kaufmann et al. 2020) as a method: from a clip to its ONNX graph and back."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.geometry.time import sample, sample_smooth
+from interpose.methods import weights
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+from interpose.skeletons import Mapping, find_mapping
+
+MULTIPLE = 32  # frames: five times halved
+
+
+@cache
+def session(path: Path) -> Any:
+    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+
+
+def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Run the graph on (B, T, 22, 3) metres of a canonical leg at 30 fps and (B, T, 22) booleans, any T.
+
+    The end is padded to the network's multiple by repeating the last frame, and cropped again.
+
+    Returns:
+        Completed positions (B, T, 22, 3) float64, on the network's own trajectory and on the one with its
+        drift taken out.
+    """
+    length = positions.shape[1]
+    frames = np.minimum(np.arange(-(-length // MULTIPLE) * MULTIPLE), length - 1)
+    # Far from the origin float32 would lose millimetres: the graph sees the body near it.
+    origin = np.zeros((len(positions), 1, 1, 3))
+    for i, known in enumerate(observed[..., 0]):
+        origin[i, 0, 0, [0, 2]] = positions[i, np.argmax(known), 0, [0, 2]]
+    feed = {
+        "positions": (positions - origin)[:, frames].astype(np.float32),
+        "observed": np.ascontiguousarray(observed[:, frames]),
+    }
+    raw, completed = session(path).run(None, feed)
+    return raw[:, :length].astype(float) + origin, completed[:, :length].astype(float) + origin
+
+
+class Cae:
+    """Fills gaps of whole poses and recovers joints; thinks at 30 fps on 22 joints scaled to one leg."""
+
+    name = "cae"
+
+    @property
+    def card(self) -> weights.Card:
+        return weights.find(self.name)
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        """Why not: a skeleton that is no humanoid, or a gap beyond what the network was trained for."""
+        mapping = find_mapping(clip.skeleton)
+        if not mapping.usable:
+            missing = ", ".join(mapping.missing)
+            return f"the skeleton has no joints for {missing} (known by their names)"
+        if gap.joints is not None and not self._moves(mapping, gap.joints):
+            return "nothing that the network knows hangs below these joints, so positions do not tell their rotation"
+        length = len(gap) * self.card.fps / clip.fps
+        if gap.joints is None and length > self.card.max_gap:
+            return f"{length:.0f} frames at {self.card.fps:g} fps are more than the {self.card.max_gap} it can fill"
+        return None
+
+    @staticmethod
+    def _moves(mapping: Mapping, names: tuple[str, ...]) -> bool:
+        """Whether any mapped joint lies below one of these joints, or a root is among them."""
+        skeleton = mapping.skeleton
+        lost = {skeleton.index(name) for name in names}
+        below = {parent for joint in mapping.joints if joint is not None for parent in skeleton.ancestors(joint)}
+        return bool(lost & below)
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        """Positions of the mapped joints at every frame, beside a spline for what positions cannot tell."""
+        card, mapping = self.card, find_mapping(clip.skeleton)
+        base = Spline().complete(clip, observation).clip
+        known = mapping.observed(observation.positions(clip.skeleton))
+        positions = mapping.positions(clip.positions()) * mapping.scale
+        times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
+        before = np.floor(times).astype(int)
+        after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
+        seen = known[before] & known[after]
+        raw, completed = (out[0] for out in run(card.onnx, sample(positions, times)[None], seen[None]))
+        drift = self._drift(observation, raw, completed, times, mapping)
+        # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
+        back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
+        spoken = sample_smooth(completed, back) / mapping.scale
+        canonical = [i for i, joint in enumerate(mapping.joints) if joint is not None]
+        joints = tuple(int(mapping.joints[i]) for i in canonical)  # type: ignore[arg-type]
+        return Raw(base, spoken[:, canonical], joints, {"model": card.name, "drift": drift})
+
+    def _drift(
+        self, observation: Observation, raw: np.ndarray, completed: np.ndarray, times: np.ndarray, mapping: Mapping
+    ) -> dict[str, float]:
+        """Metres by which the root had drifted at the end of each gap, before it was corrected."""
+        off = np.linalg.norm((raw - completed)[:, 0], axis=-1) / mapping.scale
+        drift = {}
+        for gap in observation.gaps(mapping.skeleton):
+            inside = (times >= gap.start) & (times < gap.stop)
+            if gap.joints is None and inside.any():
+                drift[f"{gap.start}:{gap.stop}"] = float(off[inside].max())
+        return drift

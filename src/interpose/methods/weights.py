@@ -1,0 +1,96 @@
+"""Trained weights on disk: an ONNX graph and a JSON card each."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from interpose.errors import FileError, RequestError, unknown
+
+# In a checkout the weights lie at its top; in an installed package inside it.
+FOLDERS = (Path(__file__).parents[3] / "weights", Path(__file__).parents[1] / "weights")
+
+
+@dataclass(frozen=True)
+class Card:
+    """What there is to know about trained weights.
+
+    Attributes:
+        name: of the weights; the folder in which they are.
+        method: the method that runs them.
+        description: one sentence.
+        licence: what the weights may be used for.
+        data: training data, a dictionary with name, licence and clips or frames each.
+        tasks: the verbs that they support.
+        joints: what they know, by name.
+        fps: frames a second at which they think.
+        max_gap: longest gap in frames at that rate.
+        training: recipe, seed, budget, commit, hours spent.
+        metrics: measured figures with the command that printed them.
+        auto: what the method `auto` goes by: from `from_gap` frames on the network is better than the spline.
+    """
+
+    name: str
+    method: str
+    description: str
+    licence: str
+    data: list[dict[str, Any]]
+    tasks: list[str]
+    joints: list[str]
+    fps: float
+    max_gap: int
+    training: dict[str, Any] = field(default_factory=dict)
+    metrics: dict[str, Any] = field(default_factory=dict)
+    auto: dict[str, Any] = field(default_factory=dict)
+    path: Path = field(default=Path(), compare=False)
+
+    @property
+    def onnx(self) -> Path:
+        return self.path.with_suffix(".onnx")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types, as in the file."""
+        return {name: value for name, value in asdict(self).items() if name != "path"}
+
+    def save(self, path: Path) -> None:
+        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
+
+    @classmethod
+    def load(cls, path: Path) -> Card:
+        """Read a card; FileError when it is damaged."""
+        try:
+            return cls(**json.loads(path.read_text()), path=path)
+        except (OSError, ValueError, TypeError) as reason:
+            raise FileError(
+                f"cannot read the card {path.name}", str(reason), "Install interpose again to restore it."
+            ) from None
+
+
+@cache
+def cards() -> list[Card]:
+    """The cards of all installed weights, by name."""
+    folder = next((folder for folder in FOLDERS if folder.is_dir()), None)
+    return [Card.load(path) for path in sorted(folder.glob("*/*.json"))] if folder else []
+
+
+def find(method: str) -> Card:
+    """The weights that a method runs. Raises RequestError when there are none."""
+    for card in cards():
+        if card.method == method and card.onnx.exists():
+            return card
+    raise RequestError(
+        f"there are no weights for the method {method}",
+        f"none lie in {' or '.join(str(folder) for folder in FOLDERS)}",
+        "Install interpose with its weights, or use --method spline.",
+    )
+
+
+def card(name: str) -> Card:
+    """The card of some weights by name; the error lists all names."""
+    for known in cards():
+        if known.name == name:
+            return known
+    raise unknown("model", name, [known.name for known in cards()])

@@ -1,0 +1,204 @@
+"""What the verbs mean: say what is observed, choose a method for each gap, window the clip, complete, report.
+
+Every gap is completed in a window of its own, cut from observed frames on both sides, with all other gaps
+hidden. So gaps do not depend on each other, and a long clip costs no more memory than its own values.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import Completion, GapReport, Report, complete, seams
+from interpose.finish.windows import ramp, runs
+from interpose.geometry import rotations
+from interpose.methods import auto, registry
+from interpose.methods.protocol import Method, Raw
+from interpose.observation import Gap, Observation
+
+CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
+PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
+OVERLAP = 1.0  # ... which overlap by this much and are blended there
+
+
+@dataclass(frozen=True)
+class Job:
+    """A run of frames in which something is missing, its number in order of time, and who fills it."""
+
+    number: int
+    gap: Gap
+    method: Method | None  # None: it stays open
+
+
+def fill(
+    clip: Clip,
+    gaps: Sequence[Gap],
+    method: str = "auto",
+    max_gap: int | None = None,
+    only: Sequence[int] | None = None,
+    seed: int | None = None,
+    methods: Mapping[int, str] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
+
+    Args:
+        clip: F frames; its values inside the gaps have no influence.
+        gaps: what is missing; gaps that touch or overlap count as one.
+        method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length.
+        max_gap: frames; longer gaps stay open.
+        only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
+        seed: for methods that sample.
+        methods: the method of single gaps by number, in place of `method`.
+        progress: called with the share done, 0 to 1.
+
+    Returns:
+        The completion; `report.open` lists the gaps left open.
+
+    Raises:
+        RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
+    """
+    observation = Observation.from_gaps(clip, gaps)
+    jobs = _plan(clip, observation, method, max_gap, only, methods or {})
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    provenance = np.zeros(rotation.shape[:2], np.int8)
+    raw = _RawClip(clip)
+    reports: list[GapReport] = []
+    limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
+    work = [(job, piece) for job in jobs if job.method for piece in _pieces(clip, observation, job.gap)]
+    for done, (job, (start, stop)) in enumerate(work):
+        assert job.method is not None
+        margin = round(CONTEXT * clip.fps)
+        lo, hi = max(0, start - margin), min(len(clip), stop + margin)
+        part = complete(clip.slice(lo, hi), observation.slice(lo, hi), job.method, seed, limit=limit)
+        fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
+        inside = slice(start - lo, stop - lo)
+        _paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
+        known = observation.translation[:, list(clip.translated)]
+        _paste(translation, part.clip.translation, known, start, inside, fade)
+        provenance[start:stop] = part.provenance[inside]
+        raw.add(part.raw, start, inside)
+        reports += _shifted(part.report.gaps, lo, start, stop, job.number)
+        if progress:
+            progress((done + 1) / len(work))
+    left = [job.gap for job in jobs if job.method is None]
+    report = Report(method, reports, left)
+    return Completion(clip.with_motion(rotation, translation), raw.done(), provenance, report)
+
+
+def recover(
+    clip: Clip,
+    joints: Sequence[str],
+    frames: tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
+
+    Arguments, result and errors are those of `fill`.
+    """
+    start, stop = frames or (0, len(clip))
+    return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def _plan(
+    clip: Clip,
+    observation: Observation,
+    method: str,
+    max_gap: int | None,
+    only: Sequence[int] | None,
+    methods: Mapping[int, str],
+) -> list[Job]:
+    """The runs of incomplete frames, numbered in order of time, each with its method."""
+    spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
+    for number in (*(only or ()), *methods):
+        if not 1 <= number <= len(spans):
+            raise RequestError(
+                f"there is no gap number {number}",
+                f"the clip has {len(spans)} gaps, counted from 1 in order of time",
+                "A dry run lists them: --dry-run.",
+            )
+    jobs = []
+    for number, gap in enumerate(spans, 1):
+        open_ = (max_gap is not None and len(gap) > max_gap) or (only is not None and number not in only)
+        name = methods.get(number, method)
+        chosen = auto.choose(clip, gap) if name == "auto" else registry.get(name)
+        jobs.append(Job(number, gap, None if open_ else chosen))
+    return jobs
+
+
+def _span(observation: Observation, clip: Clip, start: int, stop: int) -> Gap:
+    """A run of incomplete frames as one gap: of the whole pose, if that is missing anywhere in it."""
+    part = observation.rotation[start:stop]
+    if (~part).all(axis=1).any():
+        return Gap(start, stop)
+    lost = ~(part & observation.translation[start:stop])
+    return Gap(start, stop, tuple(clip.skeleton.names[j] for j in np.flatnonzero(lost.any(axis=0))))
+
+
+def _pieces(clip: Clip, observation: Observation, gap: Gap) -> Iterator[tuple[int, int]]:
+    """The gap itself; or, when single joints are missing for long, overlapping pieces of it."""
+    piece, overlap = round(PIECE * clip.fps), round(OVERLAP * clip.fps)
+    if gap.joints is None or len(gap) <= piece:
+        yield gap.start, gap.stop
+        return
+    start = gap.start
+    while start + overlap < gap.stop or start == gap.start:
+        stop = min(start + piece, gap.stop)
+        yield start, stop
+        start = stop - overlap if stop < gap.stop else stop
+
+
+def _paste(
+    whole: np.ndarray, part: np.ndarray, known: np.ndarray, start: int, inside: slice, fade: int
+) -> None:
+    """Put the unobserved values of a window into the whole clip, blended over its first `fade` frames."""
+    values = part[inside].copy()
+    stop = start + len(values)
+    if fade:
+        share = ramp(np.arange(1, fade + 1) / (fade + 1))
+        before = whole[start : start + fade]
+        if whole.shape[-1] == 4:
+            values[:fade] = rotations.slerp(before, values[:fade], share[:, None])
+        else:
+            values[:fade] = before + share[:, None, None] * (values[:fade] - before)
+    missing = ~known[start:stop]
+    whole[start:stop][missing] = values[missing]
+
+
+def _shifted(
+    reports: Iterable[GapReport], by: int, start: int, stop: int, number: int
+) -> Iterator[GapReport]:
+    """The reports of a window that concern its own gap, counted in frames of the whole clip."""
+    for one in reports:
+        if one.start + by < stop and one.stop + by > start:
+            first, last = max(one.start + by, start), min(one.stop + by, stop)
+            yield replace(one, start=first, stop=last, number=number)
+
+
+class _RawClip:
+    """What the methods themselves said, put together for the whole clip."""
+
+    def __init__(self, clip: Clip) -> None:
+        self.clip = replace(clip, rotation=clip.rotation.copy(), translation=clip.translation.copy(), source=None)
+        self.positions: np.ndarray | None = None
+        self.joints: tuple[int, ...] = ()
+
+    def add(self, raw: Raw, start: int, inside: slice) -> None:
+        stop = start + inside.stop - inside.start
+        self.clip.rotation[start:stop] = raw.clip.rotation[inside]
+        self.clip.translation[start:stop] = raw.clip.translation[inside]
+        if raw.positions is not None:
+            if self.positions is None:
+                self.joints = raw.joints
+                self.positions = np.full((len(self.clip), len(raw.joints), 3), np.nan)
+            self.positions[start:stop] = raw.positions[inside]
+
+    def done(self) -> Raw:
+        """`positions` is NaN where no method spoke of positions."""
+        return Raw(self.clip, self.positions, self.joints)

@@ -1,0 +1,139 @@
+"""From averaged weights to what ships: an ONNX graph with 16-bit weights, and its card."""
+
+from __future__ import annotations
+
+import datetime
+import json
+import os
+import subprocess
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import onnx
+import torch
+from onnx import TensorProto, helper, numpy_helper
+
+from interpose.datasets import DATASETS, Pack
+from interpose.methods.weights import Card
+from interpose.models.cae import Infiller
+from interpose.show.plot import line_plot
+from interpose.skeletons import JOINTS
+
+LICENCES = {
+    "lafan1": "CC BY-NC-ND 4.0",
+    "bandai": "CC BY-NC 4.0",
+    "pfnn": "free for academic and non-commercial use",
+    "cmu": "free for all uses, the data itself may not be resold; mocap.cs.cmu.edu",
+}
+RESEARCH = "research and non-commercial use: the training data is licensed so"
+OPEN = "any use: trained on CMU data alone"
+
+
+def export_onnx(model: Infiller, path: Path) -> None:
+    """Write the whole method as one graph, for any number of clips and any multiple of 32 frames.
+
+    Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits.
+    """
+    positions, observed = torch.randn(2, 64, len(JOINTS), 3), torch.rand(2, 64, len(JOINTS)) > 0.2
+    sizes = {0: torch.export.Dim("clips", min=1, max=4096), 1: 32 * torch.export.Dim("blocks", min=1, max=8192)}
+    program = torch.onnx.export(
+        model.eval().cpu(),
+        (positions, observed),
+        dynamo=True,
+        input_names=["positions", "observed"],
+        output_names=["raw", "completed"],
+        dynamic_shapes=(sizes, sizes),
+        verbose=False,
+    )
+    graph = program.model_proto
+    _halve(graph)
+    onnx.checker.check_model(graph)
+    new = path.with_suffix(".new")
+    onnx.save(graph, new)
+    os.replace(new, path)
+
+
+def _halve(model: onnx.ModelProto) -> None:
+    """Store large initialisers in 16 bits, each followed by a cast."""
+    casts = []
+    for i, held in enumerate(model.graph.initializer):
+        if held.data_type != TensorProto.FLOAT or np.prod(held.dims) < 1024:
+            continue
+        half = numpy_helper.from_array(numpy_helper.to_array(held).astype(np.float16), held.name + ".half")
+        casts.append(helper.make_node("Cast", [half.name], [held.name], to=TensorProto.FLOAT))
+        model.graph.initializer[i].CopyFrom(half)
+    for cast in reversed(casts):
+        model.graph.node.insert(0, cast)
+
+
+def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, Any], splits: list[str]) -> Card:
+    """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder."""
+    model = Infiller()
+    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
+    out.mkdir(parents=True, exist_ok=True)
+    export_onnx(model, out / "cae.onnx")
+    log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    hours = np.array([entry["hours"] for entry in log])
+    line_plot(
+        {"loss": (hours, np.array([entry["loss"] for entry in log]))},
+        "device hours",
+        "L1, normalised",
+        "Training of cae",
+        path=out / "loss.svg",
+    )
+    line_plot(
+        {
+            f"gap of {gap} frames": (hours, np.array([entry[f"gap{gap}"] for entry in log]))
+            for gap in (15, 30, 60)
+        },
+        "device hours",
+        "joint error, cm",
+        "Validation performers",
+        path=out / "validation.svg",
+    )
+    data = []
+    for pack in packs:
+        kept = np.isin(pack.splits, splits)
+        frames = int(np.diff(pack.starts)[kept].sum())
+        data.append(
+            {"name": pack.dataset, "licence": LICENCES[pack.dataset], "clips": int(kept.sum()), "frames": frames}
+        )
+    card = Card(
+        name="cae",
+        method="cae",
+        description="Convolutional autoencoder for infilling (Kaufmann et al. 2020), gaps to 2 s",
+        licence=OPEN if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH,
+        data=sorted(data, key=lambda one: list(DATASETS).index(one["name"])),
+        tasks=["fill", "recover"],
+        joints=list(JOINTS),
+        fps=30.0,
+        max_gap=60,
+        training={
+            "recipe": "interpose train cae",
+            **settings,
+            "splits": splits,
+            "steps": log[-1]["step"],
+            "device_hours": log[-1]["hours"],
+            "parameters": sum(p.numel() for p in model.parameters()),
+            "commit": _commit(),
+            "date": datetime.date.today().isoformat(),
+            "statistics": {
+                "mean": [round(float(v), 6) for v in model.mean.flatten()],
+                "std": [round(float(v), 6) for v in model.std.flatten()],
+            },
+        },
+        metrics={"validation": log[-1]},
+        auto={"from_gap": 0},
+    )
+    card.save(out / "cae.json")
+    return card
+
+
+def _commit() -> str:
+    try:
+        asked = ["git", "rev-parse", "--short", "HEAD"]
+        return subprocess.run(asked, capture_output=True, text=True, check=True, cwd=Path(__file__).parent).stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
