@@ -22,6 +22,8 @@ SHORTEST = 0.1
 SHORTEST_WITHOUT_JUMP = 1.0
 # The least jump, in radians and metres.
 JUMP_TURN, JUMP_WAY = 0.01, 0.02
+# The mean turn of the joints into a frame that is out of place: radians.
+OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
 # decimals stand still for long.
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
@@ -74,9 +76,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         for frame, step in ((0, 0), (len(clip) - 1, len(turned) - 1)):
             kind = _outlier(clip, turned, frame, step)
             if kind:
-                note = (
-                    "the frame has nothing to do with the next" if frame == 0 else "... with the one before"
-                )
+                note = f"nothing to do with the frame {'after' if frame == 0 else 'before'} it"
                 findings.append(Finding(kind, None, frame, frame + 1, note))
                 first, last = (1, last) if frame == 0 else (first, last - 1)
         turned, moved = turned[first : last - 1], moved[first : last - 1]
@@ -107,7 +107,11 @@ def _outlier(clip: Clip, turned: np.ndarray, frame: int, step: int) -> str | Non
     """What the first or last frame is, given the step between it and its neighbour."""
     mean = np.nan_to_num(turned).mean(axis=1)
     others = np.delete(mean, step)
-    if mean[step] < 2 * np.percentile(others, 99) or mean[step] < 10 * np.median(others):
+    if (
+        mean[step] < OUTLIER
+        or mean[step] < 2 * np.percentile(others, 99)
+        or mean[step] < 10 * np.median(others)
+    ):
         return None
     rest = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[frame]) < 0.01
     return "rest pose" if rest.mean() > 0.5 else "outlier"

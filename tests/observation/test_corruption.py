@@ -1,0 +1,96 @@
+"""Masks for training: shapes, what always stays, and the distributions of the papers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.observation import corruption
+from interpose.skeletons import JOINTS
+
+MASKS = {
+    "gap": lambda rng: corruption.gap_mask(rng, 50, 40, 22, 10, 4),
+    "gaps": lambda rng: corruption.gaps_mask(rng, 50, 40, 22, 6, 2),
+    "joints": lambda rng: corruption.joints_mask(rng, 50, 40, 22),
+    "joints per frame": lambda rng: corruption.joints_per_frame_mask(rng, 50, 40, 22, 0.3),
+    "limb": lambda rng: corruption.limb_mask(rng, 50, 40),
+    "frames": lambda rng: corruption.frames_mask(rng, 50, 40, 22, 0.3),
+}
+
+
+@pytest.mark.parametrize("name", MASKS)
+def test_masks_are_seeded_and_miss_something(name):
+    mask = MASKS[name](np.random.default_rng(1))
+    assert mask.shape == (50, 40, 22)
+    assert mask.dtype == bool
+    assert (mask == MASKS[name](np.random.default_rng(1))).all()
+    assert (mask != MASKS[name](np.random.default_rng(2))).any()
+    assert (~mask).any(axis=(1, 2)).all()
+    assert not (mask == mask[:1]).all()
+
+
+@pytest.mark.parametrize("name", ["gap", "gaps", "frames"])
+def test_whole_poses_go_and_the_ends_stay(name):
+    mask = MASKS[name](np.random.default_rng(1))
+    assert (mask == mask[:, :, :1]).all()
+    assert mask[:, [0, -1]].all()
+
+
+@pytest.mark.parametrize("name", ["joints", "limb", "joints per frame"])
+def test_the_root_stays(name):
+    assert MASKS[name](np.random.default_rng(1))[:, :, 0].all()
+
+
+def test_gaps_have_the_length_and_place_of_the_paper():
+    mask = corruption.gap_mask(np.random.default_rng(0), 20000, 120, 1, 30, 10)[:, :, 0]
+    edges = np.diff(mask.astype(int), axis=1)
+    assert ((edges == -1).sum(axis=1) == 1).all(), "one gap each"
+    length = (~mask).sum(axis=1)
+    assert abs(length.mean() - 30) < 0.3
+    assert abs(length.std() - 10) < 0.3
+    # Uniform: the free frames before the gap are any share of all free frames.
+    share = (edges.argmin(axis=1) + 1 - 1) / (120 - length - 1)
+    assert abs(share.mean() - 0.5) < 0.02
+    assert abs(np.quantile(share, 0.25) - 0.25) < 0.02
+
+
+def test_lengths_are_cut_to_the_clip():
+    mask = corruption.gap_mask(np.random.default_rng(0), 500, 10, 3, 5, 50)
+    missing = (~mask[:, :, 0]).sum(axis=1)
+    assert missing.min() == 1
+    assert missing.max() == 8
+
+
+def test_one_to_three_whole_joints_are_missing():
+    mask = corruption.joints_mask(np.random.default_rng(0), 3000, 5, 22)
+    assert (mask == mask[:, :1]).all()
+    counts = np.bincount((~mask[:, 0]).sum(axis=1), minlength=4)
+    assert counts[0] == 0
+    assert (counts[1:4] > 900).all()
+    assert (~mask[:, 0, 1:]).any(axis=0).all(), "any joint can go"
+
+
+def test_joints_and_frames_go_with_their_probability():
+    joints = corruption.joints_per_frame_mask(np.random.default_rng(0), 20, 100, 22, 0.3)
+    assert abs((~joints[:, :, 1:]).mean() - 0.3) < 0.01
+    frames = corruption.frames_mask(np.random.default_rng(0), 200, 100, 2, 0.3)
+    assert abs((~frames[:, 1:-1]).mean() - 0.3) < 0.01
+
+
+def test_limbs_are_whole_arms_and_legs():
+    mask = corruption.limb_mask(np.random.default_rng(0), 200, 3)
+    gone = {tuple(JOINTS[j] for j in np.flatnonzero(~clip[0])) for clip in mask}
+    assert gone == {
+        tuple(side + part for part in parts)
+        for side in ("Left", "Right")
+        for parts in (("UpLeg", "Leg", "Foot", "Toe"), ("Shoulder", "Arm", "ForeArm", "Hand"))
+    }
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_noise(precision):
+    positions = np.full((50, 40, 22, 3), 2.0, precision)
+    noisy = corruption.gaussian_noise(np.random.default_rng(0), positions, 0.0625)
+    assert noisy.dtype == positions.dtype
+    assert abs((noisy - positions).std() - 0.0625) < 1e-3
+    assert abs((noisy - positions).mean()) < 1e-3

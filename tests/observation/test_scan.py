@@ -1,0 +1,144 @@
+"""What the scan finds, where exactly, and that it finds nothing in good motion."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.clip import Clip, Skeleton
+from interpose.geometry import rotations
+from interpose.observation import Gap, Observation
+from interpose.observation.scan import Finding, scan, to_gaps
+
+NAMES = ("hips", "spine", "arm", "hand", "finger")
+SKELETON = Skeleton(NAMES, (-1, 0, 1, 2, 3), np.tile([0.0, 0.3, 0], (5, 1)))
+
+
+def motion(seconds: float = 4, fps: float = 30) -> Clip:
+    """Everything moves and trembles a little, but the finger, which has no data."""
+    frames = round(seconds * fps)
+    rng = np.random.default_rng(0)
+    t = np.arange(frames)[:, None, None] / fps
+    vectors = np.sin(t * np.array([1.0, 2, 3, 4, 5])[:, None] + 1) * [0.2, 0.9, 0.4]
+    vectors = vectors + rng.normal(scale=1e-4, size=vectors.shape)
+    vectors[:, 4] = 0
+    root = np.stack([np.sin(t), 1 + 0.1 * np.sin(9 * t), t], axis=-1).reshape(frames, 1, 3)
+    return Clip(SKELETON, rotations.exp(vectors), root + rng.normal(scale=1e-4, size=root.shape), fps)
+
+
+def hold(clip: Clip, start: int, stop: int, joints: list[int] | None, value: int | None = None) -> Clip:
+    """Frames start to stop - 1 repeat the frame before them (or frame `value`)."""
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    source = start - 1 if value is None else value
+    every = list(range(5)) if joints is None else joints
+    rotation[start:stop, every] = clip.rotation[source, every]
+    if joints is None:
+        translation[start:stop] = clip.translation[source]
+    return clip.with_motion(rotation, translation)
+
+
+def spans(findings: list[Finding]) -> list[tuple]:
+    return [(f.kind, f.joints, f.start, f.stop) for f in findings]
+
+
+@pytest.mark.parametrize("fps", [24, 30, 60, 120])
+def test_good_motion_has_no_findings(fps):
+    assert scan(motion(fps=fps)) == []
+
+
+@pytest.mark.parametrize("fps", [24, 30, 60, 120])
+def test_a_held_pose_is_one_finding_of_exactly_the_copies(fps):
+    start, stop = round(1.5 * fps), round(2 * fps)
+    found = scan(hold(motion(fps=fps), start, stop, None))
+    assert spans(found) == [("frozen", None, start, stop)]
+    assert to_gaps(found) == [Gap(start, stop)]
+
+
+def test_a_held_joint_is_named_and_joints_held_together_are_one_finding():
+    found = scan(hold(motion(), 40, 60, [2, 3]))
+    assert spans(found) == [("frozen", ("arm", "hand"), 40, 60)]
+    found = scan(hold(hold(motion(), 40, 60, [2]), 70, 90, [3]))
+    assert spans(found) == [("frozen", ("arm",), 40, 60), ("frozen", ("hand",), 70, 90)]
+
+
+def test_a_pose_filled_with_a_constant_is_reported_whole():
+    """Both ends jump, so none of the equal frames is the one that was held."""
+    found = scan(hold(motion(), 60, 80, None, value=0))
+    assert spans(found) == [("frozen", None, 60, 80)]
+
+
+@pytest.mark.parametrize("joints", [None, [2]])
+def test_frozen_runs_at_the_ends(joints):
+    names = None if joints is None else ("arm",)
+    # A single joint needs a second, or a jump, and at the ends there is none.
+    start = hold(motion(), 0, 45, joints, value=45)
+    assert spans(scan(start)) == [("frozen", names, 0, 45)]
+    assert spans(scan(hold(motion(), 80, 120, joints))) == [("frozen", names, 80, 120)]
+
+
+def test_a_frozen_position_is_found_and_is_no_gap():
+    clip = motion()
+    translation = clip.translation.copy()
+    translation[50:80] = translation[49]
+    found = scan(clip.with_motion(clip.rotation, translation))
+    assert spans(found) == [("frozen position", ("hips",), 50, 80)]
+    assert to_gaps(found) == []
+
+
+def test_standing_still_within_the_noise_of_capture_is_no_finding():
+    clip = motion()
+    rotation = rotations.multiply(
+        clip.rotation[60], rotations.exp(np.random.default_rng(1).normal(scale=1e-4, size=(40, 5, 3)))
+    )
+    quiet = clip.rotation.copy()
+    quiet[60:100] = rotation
+    assert scan(clip.with_motion(quiet, clip.translation)) == []
+
+
+def test_a_hinge_at_its_limit_is_no_finding():
+    """Knees stop at the rest pose for a while, coming and going without a jump."""
+    clip = motion(6)
+    angle = np.clip(np.sin(np.arange(180) / 20), 0, None)
+    rotation = clip.rotation.copy()
+    rotation[:, 2] = rotations.exp(angle[:, None] * [1.0, 0, 0])
+    assert (angle == 0).sum() > 60
+    assert scan(clip.with_motion(rotation, clip.translation)) == []
+
+
+def test_a_duplicated_frame_is_no_finding():
+    assert scan(hold(motion(), 60, 61, None)) == []
+
+
+def test_missing_values_are_listed_and_not_taken_for_frozen_ones():
+    clip = motion()
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[40:60] = np.nan
+    translation[40:60] = np.nan
+    rotation[80:90, 3] = np.nan
+    clip, observation = Observation.from_nan(SKELETON, rotation, translation, 30)
+    found = scan(clip, observation)
+    assert spans(found) == [("missing", None, 40, 60), ("missing", ("hand",), 80, 90)]
+    assert to_gaps(found) == [Gap(40, 60), Gap(80, 90, ("hand",))]
+
+
+def test_a_rest_pose_before_the_motion_is_found():
+    clip = motion()
+    rotation = clip.rotation.copy()
+    rotation[0] = SKELETON.rest_rotation
+    rotation[-1] = rotations.exp(np.array([2.0, 1, 0]))
+    rotation[-1, 4] = rotation[-2, 4]
+    found = scan(clip.with_motion(rotation, clip.translation))
+    assert spans(found) == [("rest pose", None, 0, 1), ("outlier", None, 119, 120)]
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3, 4])
+def test_tiny_and_still_clips(frames):
+    clip = motion()
+    assert scan(clip.slice(0, frames)) == []
+    still = Clip(SKELETON, np.tile([1.0, 0, 0, 0], (frames, 5, 1)), np.zeros((frames, 1, 3)), 30)
+    assert scan(still) == []
+
+
+def test_a_real_walk_has_no_frozen_body(cmu_walk):
+    found = [f for f in scan(cmu_walk) if f.kind not in ("rest pose", "outlier")]
+    assert found == []

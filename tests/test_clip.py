@@ -1,0 +1,103 @@
+"""What a clip and a skeleton promise, and how they refuse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+
+BONES = np.array([[0, 1, 0], [0, 0.5, 0], [0.3, 0, 0], [2, 0, 0]])
+
+
+def skeleton(**more: np.ndarray) -> Skeleton:
+    return Skeleton(("hips", "spine", "arm", "prop"), (-1, 0, 1, -1), BONES, **more)
+
+
+def clip(frames: int = 3, **more) -> Clip:
+    rotation = np.tile([1.0, 0, 0, 0], (frames, 4, 1))
+    return Clip(skeleton(), rotation, np.zeros((frames, 2, 3)), 30, **more)
+
+
+def test_a_skeleton_knows_its_tree():
+    body = skeleton()
+    assert len(body) == 4
+    assert body.roots == (0, 3)
+    assert body.children == ((1,), (2,), (), ())
+    assert body.ancestors(2) == (1, 0)
+    assert (body.rest_rotation == [1, 0, 0, 0]).all()
+    assert body.index("arm") == 2
+
+
+def test_unknown_joints_are_answered_with_the_nearest():
+    with pytest.raises(RequestError, match="unknown joint: amr") as error:
+        skeleton().index("amr")
+    assert "arm" in error.value.fix
+    assert "hips, spine, arm, prop" in error.value.why
+
+
+@pytest.mark.parametrize(
+    "parents", [(-1, 2, 1, -1), (-1, 0, 3, -1), (-1, 0, 1), (-2, 0, 1, -1), (-1, 1, 1, -1)]
+)
+def test_what_is_no_tree_is_refused(parents):
+    with pytest.raises(RequestError, match="no tree"):
+        Skeleton(("hips", "spine", "arm", "prop"), parents, BONES)
+
+
+def test_names_must_be_unique():
+    with pytest.raises(RequestError, match="ambiguous") as error:
+        Skeleton(("hips", "arm", "arm", "prop"), (-1, 0, 1, -1), BONES)
+    assert "arm" in error.value.why
+
+
+def test_roots_are_translated_unless_more_is_said():
+    assert clip().translated == (0, 3)
+    np.testing.assert_allclose(clip().positions()[0], [[0, 0, 0], [0, 0.5, 0], [0.3, 0.5, 0], [0, 0, 0]])
+
+
+def test_scales_act_on_what_is_below():
+    body = skeleton(rest_scale=np.array([2.0, 3.0, 5.0, 1.0]))
+    assert (body.scale_above == [1, 2, 6, 1]).all()
+    rotation = np.tile([1.0, 0, 0, 0], (1, 4, 1))
+    positions = Clip(body, rotation, np.zeros((1, 2, 3)), 30).positions()
+    np.testing.assert_allclose(positions[0, 2], [0.3 * 6, 0.5 * 2, 0])
+
+
+def test_other_animated_translations_replace_the_bone():
+    rotation = np.tile([1.0, 0, 0, 0], (1, 4, 1))
+    moved = Clip(skeleton(), rotation, np.array([[[0, 0, 0], [9, 0, 0], [0, 0.7, 0]]]), 30, (0, 3, 1))
+    np.testing.assert_allclose(moved.positions()[0], [[0, 0, 0], [0, 0.7, 0], [0.3, 0.7, 0], [9, 0, 0]])
+    np.testing.assert_allclose(moved.root, [[0, 0, 0]])
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_clip_is_finite(bad):
+    rotation = np.tile([1.0, 0, 0, 0], (3, 4, 1))
+    rotation[1, 2, 0] = bad
+    with pytest.raises(RequestError, match="no numbers") as error:
+        Clip(skeleton(), rotation, np.zeros((3, 2, 3)), 30)
+    assert "from_nan" in error.value.fix
+    with pytest.raises(RequestError, match="no numbers"):
+        Clip(skeleton(), np.tile([1.0, 0, 0, 0], (3, 4, 1)), np.full((3, 2, 3), bad), 30)
+
+
+def test_shapes_and_rate_are_checked():
+    rotation = np.tile([1.0, 0, 0, 0], (3, 4, 1))
+    with pytest.raises(RequestError, match="rotations do not fit"):
+        Clip(skeleton(), rotation[:, :3], np.zeros((3, 2, 3)), 30)
+    with pytest.raises(RequestError, match="translations do not fit"):
+        Clip(skeleton(), rotation, np.zeros((2, 2, 3)), 30)
+    for fps in (0, -1, np.nan):
+        with pytest.raises(RequestError, match="frame rate"):
+            Clip(skeleton(), rotation, np.zeros((3, 2, 3)), fps)
+
+
+def test_slices_and_new_motion():
+    whole = clip(5, source="layout", name="take")
+    part = whole.slice(1, 3)
+    assert (len(part), part.source, part.name) == (2, None, "take")
+    other = whole.with_motion(whole.rotation, whole.translation + 1)
+    assert other.source == "layout"
+    assert (whole.translation == 0).all()
+    assert whole.seconds == pytest.approx(5 / 30)
