@@ -167,3 +167,12 @@ def test_resampling_to_nothing_is_refused():
     for fps in (0, -30, float("nan")):
         with pytest.raises(RequestError, match="above zero"):
             time.resample(clip(), fps)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_long_clips_are_resampled_in_blocks_that_agree(smooth, monkeypatch):
+    whole = time.resample(clip(100), 70, smooth)
+    monkeypatch.setattr(time, "BLOCK", 7)
+    blocks = time.resample(clip(100), 70, smooth)
+    np.testing.assert_allclose(blocks.rotation, whole.rotation, atol=1e-12)
+    np.testing.assert_allclose(blocks.translation, whole.translation, atol=1e-12)

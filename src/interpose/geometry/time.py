@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 
 Array = Any
 
+# Frames that are resampled at once.
+BLOCK = 4096
+
 
 def _around(xp: Any, frames: int, times: Array) -> tuple[Array, Array, Array]:
     """The samples before and after each time (n,), and how far it lies between them, 0 to 1."""
@@ -170,7 +173,16 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     nearest = np.round(times)
     times = np.where(abs(times - nearest) < 1e-6, nearest, times)
     turn, move = (sample_rotations_smooth, sample_smooth) if smooth else (sample_rotations, sample)
-    rotation, translation = turn(clip.rotation, times), move(clip.translation, times)
+    rotation = np.empty((len(times), *clip.rotation.shape[1:]))
+    translation = np.empty((len(times), *clip.translation.shape[1:]))
+    # In blocks, so that what a long clip needs beside its result stays small. The frames that a block needs
+    # reach one further than the neighbours: smooth sampling takes velocities from there.
+    for start in range(0, len(times), BLOCK):
+        some = slice(start, start + BLOCK)
+        first = max(int(times[some][0]) - 1, 0)
+        last = int(times[some][-1]) + 3
+        rotation[some] = turn(clip.rotation[first:last], times[some] - first)
+        translation[some] = move(clip.translation[first:last], times[some] - first)
     new = np.flatnonzero(times == nearest)
     old = nearest[new].astype(int)
     rotation[new], translation[new] = clip.rotation[old], clip.translation[old]

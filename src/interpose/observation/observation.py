@@ -124,7 +124,12 @@ class Observation:
 
     @classmethod
     def from_nan(
-        cls, skeleton: Skeleton, rotation: np.ndarray, translation: np.ndarray, fps: float, translated: tuple = ()
+        cls,
+        skeleton: Skeleton,
+        rotation: np.ndarray,
+        translation: np.ndarray,
+        fps: float,
+        translated: tuple[int, ...] = (),
     ) -> tuple[Clip, Observation]:
         """A finite clip and its observation from arrays in which NaN marks missing values.
 
@@ -146,7 +151,7 @@ class Observation:
     @property
     def frames(self) -> np.ndarray:
         """(F,) True where every value of the frame is known."""
-        return self.rotation.all(axis=1) & self.translation.all(axis=1)
+        return np.asarray(self.rotation.all(axis=1) & self.translation.all(axis=1))
 
     def positions(self, skeleton: Skeleton) -> np.ndarray:
         """(F, J) True where a joint's *global position* follows from what is known.
