@@ -168,10 +168,10 @@ class Spline(_Classical):
     velocities therefore fade into that of the straight line within `REACH` seconds, which is an ordinary
     cubic up to that length. The way of a root over the ground has more inertia and gets longer.
 
-    Measured on 240 windows of LAFAN1 (subjects 1 to 4, 30 fps), mean joint error in cm on the true root, for
+    Measured on 240 windows of LAFAN1 (subjects 2 to 4, 30 fps), mean joint error in cm on the true root, for
     gaps of 15, 30 and 60 frames: 3.1, 6.9 and 11.6 with .8 s; plain cubic 3.1, 7.4 and 14.3; linear 5.1, 8.6
-    and 12.6. The root's height is best with .8 s too; its way with a plain cubic up to 2 s (11.7 cm over gaps of
-    60 frames, 13 with 1.6 s, 21 linear). On CMU's straight walks less would do: .8 s brings 4.9 cm, 2 s 6.7.
+    and 12.6. The root's height is best with .8 s too, its way with a plain cubic up to 2 s (11.7 cm over 60
+    frames, linear 21.3). On CMU's straight walks less would do: 4.9 cm with .8 s, 6.7 with 2 s.
 
     Where a gap has only one end the motion carries on and comes to rest within `REST` seconds.
     """
