@@ -63,7 +63,7 @@ def fill(
         RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
     """
     observation = Observation.from_gaps(clip, gaps)
-    jobs = _plan(clip, observation, method, max_gap, only, methods or {})
+    jobs = plan(clip, observation, method, max_gap, only, methods or {})
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
     raw = _RawClip(clip)
@@ -106,7 +106,7 @@ def recover(
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
-def _plan(
+def plan(
     clip: Clip,
     observation: Observation,
     method: str,
