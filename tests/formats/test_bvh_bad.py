@@ -83,6 +83,8 @@ def test_paths(tmp_path, good):
         ("OFFSET 0 170 0", "OFFSET 0 0 0", "length zero"),
         ("CHANNELS 3", "CHANNELS 4", "CHANNELS says 4, 3 names follow"),
         ("CHANNELS 3", "CHANNELS x", "CHANNELS says x"),
+        ("CHANNELS 3", "CHANNELS ³", "CHANNELS says ³"),
+        ("OFFSET 0 170 0", "OFFSET 0 ١٧ 0", "OFFSET needs three numbers"),
         ("CHANNELS 3 Z", "CHANNELS 3 W", "unknown or repeated"),
         ("CHANNELS 3 Zrotation", "CHANNELS 3 Xrotation", "unknown or repeated"),
         ("ROOT", "BONE", "cannot understand 'BONE'"),

@@ -97,6 +97,23 @@ def test_curves_do_not_jump(tmp_path, make_bvh):
     assert rotations.angle(again.rotation, rotation).max() < 1e-4
 
 
+@pytest.mark.parametrize("order", ["ZXY", "XYZ", "YXZ", "XZY"])
+@pytest.mark.parametrize("middle", [90.0, -90.0])
+def test_gimbal_lock(tmp_path, make_bvh, order, middle):
+    """In gimbal lock the written angles continue those before the change."""
+    joints = [("Root", 0, (0, 0, 0), "xyzZXY"), ("Tip", 1, (0, 170, 0), order)]
+    values = np.zeros((5, 9))
+    values[:, 6:] = np.stack([np.linspace(30, 34, 5), np.full(5, middle), np.full(5, 50)], axis=-1)
+    path = tmp_path / "a.bvh"
+    path.write_text(make_bvh(joints, values))
+    clip = formats.load(path)
+    rotation = clip.rotation.copy()
+    rotation[2:, 1] *= -1
+    formats.save(clip.with_motion(rotation, clip.translation), tmp_path / "b.bvh")
+    written = np.array([line.split() for line in motion_lines(tmp_path / "b.bvh")], float)
+    np.testing.assert_allclose(written, values, atol=1e-3)
+
+
 def test_style_of_numbers(tmp_path, make_bvh):
     """As many decimals as the file has, and zeros at the end only where it has them."""
     joints = [("Root", 0, (0, 0, 0), "xyzZXY"), ("Tip", 1, (0, 170, 0), "ZXY")]

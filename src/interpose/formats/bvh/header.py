@@ -17,7 +17,7 @@ HEADER_LIMIT = 4 << 20  # bytes: what comes before the first number of the motio
 JOINT_LIMIT = 2000  # kinematics keep a matrix (joints, joints)
 VALUE_LIMIT = 1e9  # degrees or file units; what is above is damage, and would overflow later
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z")
+NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _CHANNEL = re.compile(r"([XYZ])(position|rotation)\Z", re.IGNORECASE)
 _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
@@ -218,7 +218,7 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
                 joint = blocks[-1] if blocks else None
                 if joint is None or nodes[joint].channels is not None:
                     raise bad("CHANNELS stands at the wrong place")
-                count = int(words[0]) if words and words[0].isdigit() and len(words[0]) < 4 else -1
+                count = int(words[0]) if words and re.fullmatch("[0-9]{1,3}", words[0]) else -1
                 given = words[1 : words.index("}")] if "}" in words else words[1:]
                 if count != len(given):
                     said = words[0][:20] if words else "nothing"

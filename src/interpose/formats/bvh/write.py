@@ -180,8 +180,15 @@ def _put_angles(
     frames = np.flatnonzero(turned.any(axis=1))
     exact = layout.angles(rotation[frames], joints)
     mirrored = exact * [1.0, -1.0, 1.0] + 180.0
-    for row, one, two in zip(frames.tolist(), exact, mirrored):
+    # In gimbal lock only the sum or difference of the outer angles counts: the last one stays as it was.
+    locked = np.abs(np.abs(exact[..., 1]) - 90.0) < 1e-4
+    cyclic = np.array([1.0 if layout.orders[j] in "XYZXY" else -1.0 for j in joints])
+    locks = np.sign(exact[..., 1]) * cyclic * locked
+    for row, one, two, lock in zip(frames.tolist(), exact, mirrored, locks):
         before = np.where(here, (values[row - 1] if row else previous)[columns], 0.0)
+        if lock.any():
+            shift = (before[:, 2] - one[:, 2]) * np.abs(lock)
+            one = one + np.stack([-lock * shift, 0.0 * shift, shift], axis=1)
         one = one + 360.0 * np.round((before - one) / 360.0)
         two = two + 360.0 * np.round((before - two) / 360.0)
         nearer = (np.abs(two - before) * weight).sum(axis=1) < (np.abs(one - before) * weight).sum(axis=1)
