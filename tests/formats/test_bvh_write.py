@@ -117,12 +117,12 @@ def test_gimbal_lock(tmp_path, make_bvh, order, middle):
 def test_style_of_numbers(tmp_path, make_bvh):
     """As many decimals as the file has, and zeros at the end only where it has them."""
     joints = [("Root", 0, (0, 0, 0), "xyzZXY"), ("Tip", 1, (0, 170, 0), "ZXY")]
-    for text, expected in (("1.000000", b"50.000000"), ("1.23456 1 0", b"50")):
+    for text, expected in (("1.000000", b"50.123457"), ("1.23456 1 0.00012345678", b"50.12346")):
         path = tmp_path / f"{len(text)}.bvh"
         path.write_text(make_bvh(joints, [(text.split() * 9)[:9]] * 3))
         clip = formats.load(path)
         translation = clip.translation.copy()
-        translation[1, 0, 0] = 0.5
+        translation[1, 0, 0] = 0.501234567
         formats.save(clip.with_motion(clip.rotation, translation), tmp_path / "out.bvh", force=True)
         assert motion_lines(tmp_path / "out.bvh")[1].split()[0] == expected
 

@@ -214,11 +214,14 @@ class _Style:
 
 
 def _style(motion: MotionText) -> _Style:
-    """The style of the first numbers of the motion; numbers with exponents say nothing about it."""
+    """The style of the first numbers of the motion."""
     words = motion.raw(0, min(len(motion), 1 + 4096 // motion.channels)).lower().split()
-    decimals = [len(word.partition(b".")[2]) for word in words if b"e" not in word] or [DECIMALS]
-    most = max(decimals)
-    return _Style(min(max(most, LEAST_DECIMALS), MOST_DECIMALS), any(count < most for count in decimals))
+    plain = [word for word in words if b"e" not in word]
+    # Programs that write six digits give small numbers many decimals: those above one tell what is usual.
+    usual = [word for word in plain if re.match(rb"[+-]?0*[1-9]", word)] or plain
+    counts = [len(word.partition(b".")[2]) for word in usual] or [DECIMALS]
+    trimmed = any(count < max(counts) for count in counts)
+    return _Style(min(max(*counts, LEAST_DECIMALS), MOST_DECIMALS), trimmed)
 
 
 def _exchange(text: bytes, values: np.ndarray, fresh: np.ndarray, style: _Style) -> bytes:
