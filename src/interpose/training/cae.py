@@ -112,7 +112,7 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
     assert isinstance(model, Infiller)
     figures = {}
     length = positions.shape[1]
-    for gap in (15, 30, 60):
+    for gap in (gap for gap in (15, 30, 60) if gap < length - 1):
         start = (length - gap) // 2
         observed = torch.ones(positions.shape[:-1], dtype=torch.bool, device=positions.device)
         observed[:, start : start + gap] = False

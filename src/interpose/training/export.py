@@ -98,7 +98,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, A
         kept = np.isin(pack.splits, splits)
         frames = int(np.diff(pack.starts)[kept].sum())
         data.append(
-            {"name": pack.dataset, "licence": LICENCES[pack.dataset], "clips": int(kept.sum()), "frames": frames}
+            {"name": str(pack.dataset), "licence": LICENCES[pack.dataset], "clips": int(kept.sum()), "frames": frames}
         )
     card = Card(
         name="cae",

@@ -1,0 +1,213 @@
+"""Table 1 of Kaufmann et al. 2020 at 30 fps: joint error when a gap in the middle of 4 s is filled.
+
+Windows of 120 frames of held-out performers; gaps of 0, 15, 30 and 60 frames (0, .5, 1 and 2 s), centred;
+mean and standard deviation over joints and gap frames of the 3-D error in centimetres, without the hips.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interpose.evaluation.windows import Window, windows
+from interpose.finish import complete
+from interpose.finish.feet import measure
+from interpose.finish.guarantees import wipe
+from interpose.methods import registry
+from interpose.observation import Gap, Observation
+
+DATASETS = ("lafan1", "bandai")
+GAPS = (0, 15, 30, 60)
+PAPER = "linear, global positions"
+ROWS = (
+    "zero-velocity",
+    PAPER,
+    "linear, true trajectory",
+    "spline, true trajectory",
+    "spline, finished",
+    "cae, true trajectory",
+    "cae, finished",
+)
+
+
+@dataclass
+class Infilling:
+    """The figures: `errors[dataset][row][gap]` holds every window's (sum, sum of squares, count) in cm."""
+
+    split: str
+    counts: dict[str, int] = field(default_factory=lambda: defaultdict(int))
+    errors: dict[str, dict[str, dict[int, list[np.ndarray]]]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(lambda: defaultdict(list)))
+    )
+    feet: dict[str, dict[int, list[tuple[float, float]]]] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+    )
+    solves: list[float] = field(default_factory=list)
+    drifts: dict[int, list[float]] = field(default_factory=lambda: defaultdict(list))
+    fallen: dict[int, int] = field(default_factory=lambda: defaultdict(int))
+
+    def add(self, window: Window, row: str, gap: Gap, frames: int, positions: np.ndarray) -> None:
+        part = slice(gap.start, gap.stop) if frames else slice(None)
+        wrong = 100 * np.linalg.norm((positions - window.positions)[part, 1:], axis=-1)
+        figures = np.array([wrong.sum(), (wrong**2).sum(), wrong.size])
+        for group in (window.dataset, "all"):
+            self.errors[group][row][frames].append(figures)
+
+    def mean(self, group: str, row: str, frames: int) -> tuple[float, float] | None:
+        """Mean and standard deviation in cm, or None where a row has no meaning."""
+        held = self.errors[group][row].get(frames)
+        if not held:
+            return None
+        total, squares, count = np.sum(held, axis=0)
+        mean = total / count
+        return float(mean), float(np.sqrt(max(squares / count - mean**2, 0.0)))
+
+    def ratio(self, group: str, row: str, frames: int) -> float | None:
+        mine, linear = self.mean(group, row, frames), self.mean(group, PAPER, frames)
+        return mine[0] / linear[0] if mine and linear else None
+
+    def foot(self, row: str, frames: int) -> tuple[float, float]:
+        """Mean slide (cm/s) and travel (m) of the feet in the gap."""
+        slide, travel = np.mean(self.feet[row][frames], axis=0)
+        return float(slide), float(travel)
+
+    def to_dict(self) -> dict[str, Any]:
+        groups: dict[str, Any] = {}
+        for group in self.errors:
+            groups[group] = {
+                row: {
+                    str(frames): {"mean": mean[0], "std": mean[1], "ratio": self.ratio(group, row, frames)}
+                    for frames in GAPS
+                    if (mean := self.mean(group, row, frames))
+                }
+                for row in ROWS
+            }
+        feet = {
+            row: {str(frames): dict(zip(("slide", "travel"), self.foot(row, frames))) for frames in held}
+            for row, held in self.feet.items()
+        }
+        return {
+            "protocol": "Kaufmann et al. 2020, table 1, at 30 fps",
+            "split": self.split,
+            "windows": dict(self.counts),
+            "unit": "cm",
+            "errors": groups,
+            "feet": feet,
+            "solve_error": float(np.mean(self.solves)) if self.solves else None,
+            "drift": {str(gap): float(np.mean(held)) for gap, held in self.drifts.items()},
+            "fell_back": dict(self.fallen),
+        }
+
+    def table(self, group: str = "all") -> str:
+        """A Markdown table: error in cm with its standard deviation, and the ratio to the paper's linear row."""
+        head = ["", *(f"{frames} frames" for frames in GAPS)]
+        lines = [head, ["---"] + ["---:"] * len(GAPS)]
+        for row in ROWS:
+            cells = [row]
+            for frames in GAPS:
+                mean, ratio = self.mean(group, row, frames), self.ratio(group, row, frames)
+                cell = f"{mean[0]:.2f} ± {mean[1]:.1f}" if mean else "-"
+                cells.append(cell + (f" ({ratio:.2f})" if ratio is not None else ""))
+            lines.append(cells)
+        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+    def feet_table(self) -> str:
+        """A Markdown table of foot slide and travel in the gap, next to the truth's."""
+        frames = [gap for gap in GAPS if gap]
+        lines = [["feet: slide cm/s, travel m", *(f"{gap} frames" for gap in frames)], ["---"] + ["---:"] * len(frames)]
+        for row in self.feet:
+            figures = [self.foot(row, gap) for gap in frames]
+            lines.append([row, *(f"{slide:.1f}, {travel:.2f}" for slide, travel in figures)])
+        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+    def __str__(self) -> str:
+        parts = [f"{group} ({self.counts[group]} windows, {self.split})\n\n{self.table(group)}" for group in self.errors]
+        drift = ", ".join(f"{np.mean(held):.1f} cm at {gap}" for gap, held in self.drifts.items())
+        notes = [
+            "Mean ± standard deviation of the joint error in cm (ratio to the paper's linear row).",
+            f"Solve: {np.mean(self.solves):.2f} cm from the network's positions. Root drift before correction: {drift}.",
+            f"Fell back to the spline: {dict(self.fallen) or 'never'}.",
+        ]
+        return "\n\n".join([*parts, self.feet_table(), "\n".join(notes)])
+
+
+def run(
+    data: Path,
+    split: str = "validation",
+    most: int | None = None,
+    progress: Callable[[float, str], None] = lambda share, line: None,
+) -> Infilling:
+    """Measure all rows on the windows of a split.
+
+    Args:
+        data: the folder that holds lafan1/ and bandai/.
+        split: "validation", or "test" for final figures.
+        most: windows per data set; None for all.
+    """
+    result = Infilling(split)
+    chosen = list(windows(data, DATASETS, split, most=most, progress=lambda line: progress(0.0, line)))
+    for done, window in enumerate(chosen):
+        result.counts[window.dataset] += 1
+        result.counts["all"] += 1
+        for frames in GAPS:
+            _measure(result, window, frames)
+        progress((done + 1) / len(chosen), f"{done + 1} of {len(chosen)} windows")
+    return result
+
+
+def _measure(result: Infilling, window: Window, frames: int) -> None:
+    gap = window.centred(frames)
+    hidden = window.hide(gap)
+    network = registry.get("cae")
+    if frames == 0:
+        raw = network.complete(window.clip, hidden)
+        assert raw.positions is not None
+        result.add(window, "cae, true trajectory", gap, 0, window.on_true_way(_spoken(window, raw.positions)))
+        return
+    wiped = wipe(window.clip, hidden)
+    for name in ("zero-velocity", "linear"):
+        answer = registry.get(name).complete(wiped, hidden).clip
+        row = name if name == "zero-velocity" else f"{name}, true trajectory"
+        result.add(window, row, gap, frames, window.on_true_way(window.canonical(answer)))
+    result.add(window, PAPER, gap, frames, _linear(window.positions, gap))
+    for name in ("spline", "cae"):
+        completion = complete(window.clip, hidden, registry.get(name))
+        raw = completion.raw
+        said = window.canonical(raw.clip) if raw.positions is None else _spoken(window, raw.positions)
+        result.add(window, f"{name}, true trajectory", gap, frames, window.on_true_way(said))
+        result.add(window, f"{name}, finished", gap, frames, window.canonical(completion.clip))
+        _feet(result, window, completion.clip, hidden, gap, f"{name}, finished")
+        if name == "cae":
+            (report,) = completion.report.gaps
+            result.fallen[frames] += report.method != name
+            result.solves += [report.solve_error] if report.solve_error is not None else []
+            result.drifts[frames] += [report.drift] if report.drift is not None else []
+    _feet(result, window, window.clip, hidden, gap, "truth")
+
+
+def _spoken(window: Window, positions: np.ndarray) -> np.ndarray:
+    """What a network says of a skeleton's own joints, as canonical positions (T, 22, 3)."""
+    own = np.zeros((len(positions), len(window.clip.skeleton), 3))
+    own[:, [joint for joint in window.mapping.joints if joint is not None]] = positions
+    return window.mapping.positions(own)
+
+
+def _linear(positions: np.ndarray, gap: Gap) -> np.ndarray:
+    """Straight lines of every joint's global position over the gap: the paper's interpolation row."""
+    filled = positions.copy()
+    share = (np.arange(1, len(gap) + 1) / (len(gap) + 1))[:, None, None]
+    filled[gap.start : gap.stop] = (1 - share) * positions[gap.start - 1] + share * positions[gap.stop]
+    return filled
+
+
+def _feet(
+    result: Infilling, window: Window, clip: Any, hidden: Observation, gap: Gap, row: str
+) -> None:
+    measured = measure(clip, hidden, gap.start, gap.stop)
+    if measured:
+        result.feet[row][len(gap)].append(measured)

@@ -1,0 +1,96 @@
+"""Windows of held-out performers, cut the same way for every row of a table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.datasets import clips
+from interpose.errors import RequestError
+from interpose.geometry.ground import turn
+from interpose.observation import Gap, Observation
+from interpose.skeletons import Mapping, find_mapping
+from interpose.skeletons.body import facing
+
+SPLITS = ("validation", "test")
+
+
+@dataclass(frozen=True)
+class Window:
+    """A piece of a clip at its own skeleton, and the canonical positions (T, 22, 3) of it in metres."""
+
+    dataset: str
+    clip: Clip
+    mapping: Mapping
+    positions: np.ndarray
+
+    def centred(self, gap: int) -> Gap:
+        """The range of `gap` frames in the middle."""
+        start = (len(self.clip) - gap) // 2
+        return Gap(start, start + gap)
+
+    def hide(self, gap: Gap) -> Observation:
+        return Observation.from_gaps(self.clip, [gap] if len(gap) else [])
+
+    def canonical(self, clip: Clip) -> np.ndarray:
+        return self.mapping.positions(clip.positions())
+
+    def on_true_way(self, positions: np.ndarray) -> np.ndarray:
+        """Poses (T, 22, 3) laid on the true trajectory: hips over the true point, facing the true way.
+
+        So a trajectory does not count, as in Kaufmann et al. 2020, table 1 ("poses are root aligned").
+        """
+        body = turn(positions - _floor(positions), -facing(positions)[:, None])
+        return turn(body, facing(self.positions)[:, None]) + _floor(self.positions)
+
+
+def _floor(positions: np.ndarray) -> np.ndarray:
+    """The points (T, 1, 3) on the floor below the hips."""
+    return positions[:, :1] * [1.0, 0.0, 1.0]
+
+
+def windows(
+    data: Path,
+    datasets: tuple[str, ...],
+    split: str,
+    length: int = 120,
+    step: int = 120,
+    most: int | None = None,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Iterator[Window]:
+    """Whole windows of the performers of a split, at 30 fps.
+
+    Args:
+        data: the folder that holds the data sets.
+        split: "validation" for development, "test" for final figures.
+        length, step: frames.
+        most: windows per data set, spread evenly over all of them; None for all.
+    """
+    if split not in SPLITS:
+        raise RequestError(f"unknown split: {split}", f"it is none of: {', '.join(SPLITS)}", "Choose one of these.")
+    for dataset in datasets:
+        entries = clips(dataset, data, split)
+        progress(f"{dataset}: reading {len(entries)} clips")
+        starts: list[tuple[Clip, int]] = []
+        for entry in entries:
+            clip = entry.load()
+            every = max(1, round(clip.fps / 30.0))
+            clip = Clip(
+                clip.skeleton,
+                clip.rotation[::every],
+                clip.translation[::every],
+                clip.fps / every,
+                clip.translated,
+                entry.path.stem,
+            )
+            starts += [(clip, start) for start in range(0, len(clip) - length + 1, step)]
+        if most is not None and most < len(starts):
+            starts = [starts[i] for i in np.linspace(0, len(starts) - 1, most).astype(int)]
+        for clip, start in starts:
+            cut = clip.slice(start, start + length)
+            mapping = find_mapping(cut.skeleton)
+            yield Window(dataset, cut, mapping, mapping.positions(cut.positions()))

@@ -1,0 +1,81 @@
+"""Splits are obeyed, published layouts are read, packs keep test performers out."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+
+from interpose.datasets import Pack, build_pack, clips, split_of
+from interpose.datasets.pack import STEP
+from interpose.errors import FileError, RequestError
+from interpose.formats import load
+from interpose.skeletons import find_mapping
+
+
+@pytest.fixture
+def published(tmp_path, data):  # type: ignore[no-untyped-def]
+    """Empty-handed copies of the published layouts, all with the same small clip in them."""
+    names = [
+        "lafan1/bvh/walk1_subject1.bvh",
+        "lafan1/bvh/run1_subject4.bvh",
+        "lafan1/bvh/jumps1_subject5.bvh",
+        "lafan1/cuts/dance2_subject4_turn.bvh",
+        "lafan1/cuts/dance2_subject5_turn.bvh",
+        "bandai/Bandai-Namco-Research-Motiondataset-1/data/dataset-1_bow_normal_001.bvh",
+        "bandai/Bandai-Namco-Research-Motiondataset-2/data/dataset-2_walk_normal_001.bvh",
+        "bandai/Bandai-Namco-Research-Motiondataset-2/data/dataset-2_walk_youthful_001.bvh",
+        "cmu/bvh/02/02_01.bvh",
+        "cmu/bvh/08/08_01.bvh",
+        "cmu/bvh/16/16_15.bvh",
+    ]
+    for name in names:
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(data / "cmu_walk.bvh", tmp_path / name)
+    return tmp_path
+
+
+def test_splits_of_the_data_sets():
+    assert split_of("lafan1", "subject5") == "test" and split_of("lafan1", "subject4") == "validation"
+    assert split_of("lafan1", "subject1") == "train"
+    assert split_of("bandai", "dataset-2/masculine") == "test" and split_of("bandai", "dataset-1/normal") == "train"
+    assert {split_of("cmu", subject) for subject in ("16", "49")} == {"test"}
+    assert split_of("cmu", "08") == "validation" and split_of("hdm05", "tr") == "test"
+
+
+def test_entries_know_performer_label_and_split(published):
+    found = {entry.path.stem: entry for entry in clips("lafan1", published)}
+    assert found["jumps1_subject5"].split == "test" and found["jumps1_subject5"].label == "jumps"
+    assert found["run1_subject4"].split == "validation"
+    assert found["dance2_subject4_turn"].split == "train", "cuts only train"
+    assert "dance2_subject5_turn" not in found, "but nothing of a test performer trains"
+    styles = {entry.performer: entry.split for entry in clips("bandai", published)}
+    assert styles == {"dataset-1/normal": "train", "dataset-2/normal": "test", "dataset-2/youthful": "validation"}
+
+
+def test_cmu_loses_its_rest_pose(published):
+    entry = clips("cmu", published, "train")[0]
+    assert len(entry.load()) == len(load(entry.path)) - 1
+
+
+def test_pack_holds_positions_and_no_test_performer(published, tmp_path):
+    pack = build_pack("cmu", published)
+    assert set(pack.performers) == {"02", "08"} and "test" not in pack.splits
+    pack.save(tmp_path / "cmu.npz")
+    again = Pack.load(tmp_path / "cmu.npz")
+    clip = clips("cmu", published, "train")[0].load()
+    mapping = find_mapping(clip.skeleton)
+    truth = mapping.positions(clip.positions()[:: max(1, round(clip.fps / 30))]) * mapping.scale
+    packed = again.hips[: again.starts[1], None] + again.offset[: again.starts[1]].astype(float) * STEP
+    assert np.abs(packed - truth).max() < 1e-4
+
+
+def test_what_is_not_there_is_said(tmp_path):
+    with pytest.raises(FileError, match="no clips of lafan1"):
+        clips("lafan1", tmp_path)
+    with pytest.raises(RequestError, match="Did you mean lafan1"):
+        clips("lafan", tmp_path)
+    (tmp_path / "x.npz").write_bytes(b"no pack")
+    with pytest.raises(FileError, match="cannot read the pack"):
+        Pack.load(tmp_path / "x.npz")

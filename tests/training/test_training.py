@@ -1,0 +1,100 @@
+"""Budgets, curricula, windows, and a short training run that learns, stops and goes on."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from interpose.datasets import Pack  # noqa: E402
+from interpose.datasets.pack import STEP  # noqa: E402
+from interpose.errors import FileError, RequestError  # noqa: E402
+from interpose.skeletons import find_mapping  # noqa: E402
+from interpose.training.budget import Budget  # noqa: E402
+from interpose.training.cae import CaeSettings, corrupt, curriculum_mean, train_cae  # noqa: E402
+from interpose.training.windows import Windows  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def pack(cmu_walk):  # type: ignore[no-untyped-def]
+    mapping = find_mapping(cmu_walk.skeleton)
+    step = round(cmu_walk.fps / 30)
+    positions = mapping.positions(cmu_walk.positions()[::step]) * mapping.scale
+    offset = np.rint((positions - positions[:, :1]) / STEP).astype(np.int16)
+    half = len(positions) // 2
+    return Pack(
+        "cmu",
+        offset,
+        positions[:, 0].astype(np.float32),
+        np.array([0, half, len(positions)]),
+        np.array(["a", "b"]),
+        np.array(["02", "08"]),
+        np.array(["walk", "walk"]),
+        np.array(["train", "validation"]),
+    )
+
+
+@pytest.mark.parametrize(("text", "seconds", "steps"), [("90s", 90, None), ("25m", 1500, None), ("12steps", None, 12)])
+def test_budgets(text, seconds, steps):
+    budget = Budget.parse(text)
+    assert (budget.seconds, budget.steps) == (seconds, steps)
+
+
+@pytest.mark.parametrize("text", ["", "25", "m", "-3h", "0s", "3 weeks"])
+def test_budgets_that_are_none(text):
+    with pytest.raises(RequestError, match="--budget 25m"):
+        Budget.parse(text)
+
+
+def test_curriculum_of_the_paper():
+    """At 30 fps: 5 frames at first, never shorter again, 60 from epoch 69 of 200 on, in steps of 5."""
+    means = [curriculum_mean(CaeSettings(), f) for f in np.linspace(0, 1, 400)]
+    assert means[0] == 5 and means[-1] == 60
+    assert all(a <= b for a, b in zip(means, means[1:]))
+    assert sorted(set(np.round(means, 6))) == list(range(5, 65, 5))
+    assert curriculum_mean(CaeSettings(), 0.34) < 60 == curriculum_mean(CaeSettings(), 0.346)
+
+
+def test_corruption_mixes_gaps_and_joints():
+    observed = corrupt(np.random.default_rng(0), CaeSettings(), 0.9, 400)
+    whole_pose = (~observed).all(axis=2).any(axis=1)
+    assert 0.6 < whole_pose.mean() < 0.8
+    joints = (~observed[~whole_pose]).all(axis=1).sum(axis=1)
+    assert set(joints) == {1, 2, 3}
+    assert observed[~whole_pose][:, :, 0].all()
+
+
+def test_windows_are_real_motion_padded_with_the_last_pose(pack):
+    windows = Windows([pack], ["train"], 500, torch.device("cpu"))
+    positions = windows.draw(np.random.default_rng(0), 3, mirror=False)
+    half = int(pack.starts[1])
+    truth = pack.hips[:half, None] + pack.offset[:half].astype(np.float32) * STEP
+    assert np.allclose(positions[0, :half], truth, atol=1e-6)
+    assert torch.equal(positions[0, half:], positions[0, half - 1 : half].expand(500 - half, -1, -1))
+
+
+def test_splits_are_kept_apart(pack):
+    assert Windows([pack], ["train"], 60, torch.device("cpu")).frames == pack.starts[1]
+    with pytest.raises(RequestError, match="nothing to train on"):
+        Windows([pack], ["test"], 60, torch.device("cpu"))
+
+
+def test_training_learns_writes_a_log_and_goes_on(pack, tmp_path):
+    settings = CaeSettings(length=32, batch=4, every_seconds=0.0, curriculum=0.5, last_gap=8, sigma=2)
+    lines: list[str] = []
+    train_cae([pack], tmp_path, Budget.parse("6steps"), settings, say=lines.append)
+    model = train_cae([pack], tmp_path, Budget.parse("12steps"), settings, say=lines.append)
+    log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert log[-1]["step"] == 12 and log[-1]["fraction"] == 1
+    assert any("goes on at 50 %" in line for line in lines)
+    assert log[-1]["loss"] < log[0]["loss"]
+    assert torch.isfinite(torch.cat([p.flatten() for p in model.parameters()])).all()
+
+
+def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):
+    (tmp_path / "checkpoint.pt").write_bytes(b"PK not really")
+    with pytest.raises(FileError, match="cannot go on"):
+        train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2))
