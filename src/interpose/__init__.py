@@ -1,0 +1,213 @@
+"""interpose puts poses between poses: fills what is missing in human motion clips.
+
+    import interpose
+
+    done = interpose.fill("take.bvh", "120:160")
+    print(done.report)
+    interpose.save(done.clip, "take.filled.bvh")
+
+Units and axes: metres, Y up, right-handed; unit quaternions (w, x, y, z); frames are 0-based and ranges
+half-open. Nothing heavy is imported before it is used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from interpose.clip import Clip, Skeleton
+    from interpose.errors import FileError, InterposeError, RequestError
+    from interpose.finish import Completion
+    from interpose.formats import load, save
+    from interpose.methods.registry import names as method_names
+    from interpose.observation import Gap, Observation, Pin
+    from interpose.observation.scan import scan
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Clip",
+    "Completion",
+    "FileError",
+    "Gap",
+    "InterposeError",
+    "Observation",
+    "Pin",
+    "RequestError",
+    "Skeleton",
+    "__version__",
+    "fill",
+    "load",
+    "method_names",
+    "recover",
+    "save",
+    "scan",
+]
+
+# Where each public name lives: PEP 562, so that `import interpose` costs next to nothing.
+_HOMES = {
+    "Clip": "interpose.clip",
+    "Completion": "interpose.finish",
+    "FileError": "interpose.errors",
+    "Gap": "interpose.observation",
+    "InterposeError": "interpose.errors",
+    "Observation": "interpose.observation",
+    "Pin": "interpose.observation",
+    "RequestError": "interpose.errors",
+    "Skeleton": "interpose.clip",
+    "load": "interpose.formats",
+    "method_names": "interpose.methods.registry:names",
+    "save": "interpose.formats",
+    "scan": "interpose.observation.scan",
+}
+
+AnyGap: TypeAlias = "Gap | str | tuple[int, int] | tuple[int, int, Sequence[str]]"
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module 'interpose' has no attribute {name!r}")
+    module, _, attribute = _HOMES[name].partition(":")
+    value = getattr(import_module(module), attribute or name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def fill(
+    clip: Clip | str | Path,
+    gaps: AnyGap | Sequence[AnyGap] | Observation | None = None,
+    *,
+    method: str = "auto",
+    max_gap: int | None = None,
+    only: Sequence[int] | None = None,
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Fill gaps of a clip; what is observed comes back unchanged, bit for bit.
+
+    Args:
+        clip: a clip, or the path of one. Its values inside the gaps have no influence.
+        gaps: one or several, each a Gap, "120:160" for frames 120 to 159, (120, 160) or
+            (120, 160, ["LeftArm"]). An Observation says for every value whether it is known. None: what a
+            scan of the clip finds.
+        method: one of `method_names()`, or "auto" for what measured best at each gap's length.
+        max_gap: frames; longer gaps stay open.
+        only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
+        seed: for methods that sample.
+        progress: called with the share done, 0 to 1.
+
+    Returns:
+        The completion: `.clip`, `.report` (one entry a gap; `.report.open` lists what was left), `.raw` and
+        `.provenance`.
+
+    Raises:
+        RequestError: nothing to fill, or a range, joint, number or method that does not exist.
+        FileError: the file cannot be read.
+    """
+    from interpose import tasks
+    from interpose.errors import RequestError
+    from interpose.finish import complete
+    from interpose.methods import auto, registry
+    from interpose.observation import Observation
+    from interpose.observation.scan import scan, to_gaps
+
+    clip = _clip(clip)
+    if isinstance(gaps, Observation):
+        if max_gap is not None or only is not None:
+            raise RequestError(
+                "max_gap and only do not go with an Observation",
+                "they choose among gaps, and an observation has none of its own",
+                "Give gaps instead, for example observation.gaps(clip.skeleton).",
+            )
+        missing = gaps.gaps(clip.skeleton)
+        if method == "auto" and missing:
+            return complete(clip, gaps, auto.choose(clip, max(missing, key=len)), seed)
+        return complete(clip, gaps, registry.get("spline" if method == "auto" else method), seed)
+    if gaps is None:
+        wanted = to_gaps(scan(clip))
+        if not wanted:
+            raise RequestError(
+                "nothing to fill",
+                "no gaps were given, and a scan finds nothing missing",
+                'Give gaps="120:160".',
+            )
+    else:
+        wanted = [_gap(gap) for gap in _several(gaps)]
+    return tasks.fill(clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress)
+
+
+def recover(
+    clip: Clip | str | Path,
+    joints: str | Sequence[str],
+    frames: str | tuple[int, int] | None = None,
+    *,
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Recover joints whose local rotations are unknown, over the whole clip or in a range of frames.
+
+    Args:
+        clip: a clip, or the path of one.
+        joints: names; one name may stand alone.
+        frames: "120:160" or (120, 160); None for all.
+        method, seed, progress: as in `fill`.
+
+    Returns and raises what `fill` does.
+    """
+    from interpose import tasks
+
+    chosen = _gap(frames) if frames is not None else None
+    return tasks.recover(
+        _clip(clip),
+        [joints] if isinstance(joints, str) else list(joints),
+        (chosen.start, chosen.stop) if chosen else None,
+        method=method,
+        seed=seed,
+        progress=progress,
+    )
+
+
+def _clip(clip: Clip | str | Path) -> Clip:
+    from interpose.clip import Clip
+    from interpose.formats import load
+
+    return clip if isinstance(clip, Clip) else load(clip)
+
+
+def _several(gaps: Any) -> list[Any]:
+    """The gaps of a list, or a list of the one that was given: a pair of numbers is one."""
+    from interpose.observation import Gap
+
+    if isinstance(gaps, Gap | str):
+        return [gaps]
+    gaps = list(gaps)
+    return [tuple(gaps)] if gaps and isinstance(gaps[0], int) else gaps
+
+
+def _gap(gap: Any) -> Gap:
+    from interpose.errors import RequestError
+    from interpose.observation import Gap
+
+    if isinstance(gap, Gap):
+        return gap
+    if isinstance(gap, str):
+        return Gap.parse(gap)
+    try:
+        start, stop, *joints = gap
+        names = [joints[0]] if joints and isinstance(joints[0], str) else joints[0] if joints else None
+        return Gap(int(start), int(stop), tuple(names) if names is not None else None)
+    except (TypeError, ValueError):
+        raise RequestError(
+            f"cannot read the gap {gap!r}",
+            "a gap is a Gap, a text or a tuple",
+            'Write "120:160", (120, 160) or (120, 160, ["LeftArm"]).',
+        ) from None

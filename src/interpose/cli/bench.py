@@ -1,0 +1,106 @@
+"""interpose bench: published protocols, and what auto goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+from cyclopts import App
+
+from interpose.cli.console import console, say, say_json
+
+app = App(name="bench", help="Measure how good the methods are, by published protocols.")
+
+
+@app.command
+def infilling(
+    *,
+    data: Path = Path("data"),
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Kaufmann et al. 2020, table 1: joint error when gaps of 0 to 60 frames in 4 s are filled.
+
+    Try:
+      interpose bench infilling --data data --split test
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        split: validation for development, test for final figures.
+        most: windows of each data set; all without it.
+        json: print JSON for other programs.
+        markdown: print only the table of all windows, in Markdown.
+    """
+    from interpose.evaluation.infilling import run
+
+    with _bar() as progress:
+        result = run(data, split, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@app.command
+def threshold(
+    *,
+    data: Path = Path("data"),
+    most: int | None = 60,
+    plot: Path | None = None,
+    save: bool = False,
+    json: bool = False,
+) -> None:
+    """From which length of gap on the network beats the spline: what the method auto goes by.
+
+    Measured on validation performers.
+
+    Args:
+        data: the folder with the unpacked data sets.
+        most: windows of each data set.
+        plot: an SVG file to draw the errors into.
+        save: write the result into the card of the weights.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.threshold import measure
+    from interpose.methods import weights
+
+    card = weights.find("cae")
+    with _bar() as progress:
+        result = measure(data, most, progress)
+    if plot is not None:
+        result.plot(plot)
+    if save:
+        replace(card, auto=result.to_dict()).save(card.path)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(str(result))
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[float, str], None]]:
+    """Progress of minutes: a bar in a terminal, a line every tenth elsewhere."""
+    screen = console(stderr=True)
+    if not screen.is_terminal:
+        told = -1
+
+        def tell(share: float, line: str) -> None:
+            nonlocal told
+            if share == 0 or int(10 * share) > told:
+                told = int(10 * share)
+                screen.print(line)
+
+        yield tell
+        return
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    with Progress(
+        TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=screen, transient=True
+    ) as bar:
+        task = bar.add_task("reading", total=1.0)
+        yield lambda share, line: bar.update(task, completed=share, description=line)

@@ -1,0 +1,151 @@
+"""What verbs print with: tables, progress, and errors in three lines."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+from interpose.errors import InterposeError, RequestError
+
+if TYPE_CHECKING:
+    from cyclopts import CycloptsError
+    from rich.console import Console
+
+# Work on fewer frames than this is over before anyone wonders.
+LONG = 3000
+# Lines of a pipe or a file are as long as they need to be.
+WIDE = 250
+
+
+def console(stderr: bool = False) -> Console:
+    """Made anew for every use, so that it goes where the stream goes now."""
+    from rich.console import Console
+
+    stream = sys.stderr if stderr else sys.stdout
+    width = None if stream.isatty() or "COLUMNS" in os.environ else WIDE
+    return Console(stderr=stderr, highlight=False, markup=False, soft_wrap=True, width=width)
+
+
+def say(text: str = "", style: str | None = None) -> None:
+    """One line of output, or several."""
+    console().print(text, style=style)
+
+
+def say_json(content: Any) -> None:
+    sys.stdout.write(json.dumps(content, indent=2, allow_nan=False) + "\n")
+
+
+def say_table(columns: Sequence[str], rows: Iterable[Sequence[str]], right: Iterable[str] = ()) -> None:
+    """A table without lines; columns that are empty in every row are left out.
+
+    Args:
+        columns: their headings.
+        rows: a text for each column.
+        right: headings of the columns that are flush right.
+    """
+    from rich.table import Table
+
+    rows = [list(row) for row in rows]
+    used = [i for i in range(len(columns)) if any(row[i] for row in rows)]
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="bold")
+    flush = set(right)
+    for i in used:
+        is_number = columns[i] in flush
+        table.add_column(columns[i], justify="right" if is_number else "left", no_wrap=is_number)
+    for row in rows:
+        table.add_row(*(row[i] for i in used))
+    screen = console()
+    screen.soft_wrap = False  # cells wrap inside their column
+    screen.print(table)
+
+
+def seconds(frames: int, fps: float) -> str:
+    return f"{frames / fps:.2f} s"
+
+
+def names(joints: Sequence[str] | None, most: int = 4) -> str:
+    """Joint names, the first few of many; the whole pose for None."""
+    if joints is None:
+        return "all"
+    shown = ", ".join(joints[:most])
+    return shown + (f" and {len(joints) - most} more" if len(joints) > most else "")
+
+
+@contextmanager
+def progress(what: str, frames: int) -> Iterator[Callable[[float], None] | None]:
+    """Shows how far long work has got: a bar in a terminal, one plain line elsewhere; None for short work.
+
+    The caller calls what it gets with the share done, 0 to 1.
+    """
+    if frames < LONG:
+        yield None
+        return
+    screen = console(stderr=True)
+    if not screen.is_terminal:
+        screen.print(f"{what} ...")
+        yield None
+        return
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    parts = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
+    with Progress(*parts, console=screen, transient=True) as bar:
+        task = bar.add_task(what, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def complain(error: InterposeError) -> None:
+    """An error on stderr: what, why and what to do, one line each."""
+    first, *rest = (" ".join(line.split()) for line in (error.what, error.why, error.fix) if line)
+    screen = console(stderr=True)
+    screen.print(f"error: {first}", style="bold red")
+    for line in rest:
+        screen.print(f"  {line}")
+
+
+def usage_error(error: CycloptsError) -> RequestError:
+    """What is wrong with a command line, in the words of all other errors."""
+    import difflib
+
+    from cyclopts import (
+        CoercionError,
+        MissingArgumentError,
+        RepeatArgumentError,
+        UnknownCommandError,
+        UnknownOptionError,
+        UnusedCliTokensError,
+    )
+
+    verb = " ".join(["interpose", *(error.command_chain or ())])
+    see = f"{verb} --help explains it."
+    if isinstance(error, UnknownCommandError):
+        known = [name for name in error.app or () if not name.startswith("-")]
+        name = (error.unused_tokens or [""])[0]
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        return RequestError(f"unknown verb: {name}", f"{verb} knows: {', '.join(known)}", hint + see)
+    if isinstance(error, UnknownOptionError):
+        name = error.token.keyword or error.token.value
+        known = [name for argument in error.argument_collection for name in argument.names if argument.parse]
+        near = difflib.get_close_matches(name, known, n=1)
+        hint = f"Did you mean {near[0]}? " if near else ""
+        return RequestError(f"unknown option: {name}", f"{verb} has none of that name", hint + see)
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        given = error.keyword or next((t.keyword for t in error.argument.tokens if t.keyword), None)
+        if given:
+            return RequestError(f"{given} is incomplete", "nothing follows it", see)
+        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without", see)
+    if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
+        kind = {int: "a whole number", float: "a number"}.get(error.target_type, "of the right kind")  # type: ignore[arg-type]
+        return RequestError(
+            f"cannot use {error.token.keyword} {error.token.value}", f"its value must be {kind}", see
+        )
+    if isinstance(error, RepeatArgumentError) and error.token.keyword:
+        return RequestError(f"{error.token.keyword} stands there twice", "it takes one value", see)
+    if isinstance(error, UnusedCliTokensError):
+        extra = " ".join(error.unused_tokens or ())
+        return RequestError(f"do not know what to do with: {extra}", f"{verb} takes fewer arguments", see)
+    return RequestError("the command line is wrong", str(error), see)

@@ -1,0 +1,53 @@
+"""interpose convert: another format, another rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from interpose.cli.console import say
+from interpose.cli.reading import Reading, describe
+from interpose.errors import RequestError
+
+
+def convert(
+    file: Annotated[Path, Parameter(name="IN")],
+    output: Annotated[Path, Parameter(name="OUT")],
+    /,
+    *,
+    fps: float | None = None,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> None:
+    """Write a clip in another format, or at another frame rate.
+
+    A BVH file that becomes one again at the same rate keeps its layout and every number's text. Else BVH is
+    written in centimetres, Y up. The suffix says the format: .bvh, .npz.
+
+    Try:
+      interpose convert take.bvh take.npz
+      interpose convert take.bvh take30.bvh --fps 30
+
+    Args:
+        file: the clip to read.
+        output: the file to write.
+        fps: frames a second of what is written.
+        force: replace an existing file.
+    """
+    from interpose.formats import save
+    from interpose.geometry.time import resample
+
+    clip = reading.load(file)
+    if output.exists() and output.samefile(file):
+        raise RequestError(
+            f"cannot write {output}", "it is the input, which stays as it is", "Choose another name."
+        )
+    made = resample(clip, fps) if fps is not None else clip
+    notes = save(replace(made, name=output.stem), output, force=force)
+    say("\n".join(describe(file, clip)))
+    for note in notes:
+        say(f"note: {note}")
+    say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps")

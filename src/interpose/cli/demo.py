@@ -1,0 +1,128 @@
+"""interpose demo: a gap in a real clip is filled, and the result laid beside the truth."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from interpose.cli.console import say, say_table, seconds
+from interpose.errors import FileError
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+    from interpose.finish import Completion
+    from interpose.observation import Gap
+
+GAP = 66, 96  # the middle second of the bundled clip
+FILLED, PLAIN, TRUTH = "#d1495b", "#2e86ab", "#6b7280"
+
+
+def example(folder: Path) -> Path:
+    """The bundled clip, copied into a folder."""
+    path = folder / "walk.bvh"
+    path.write_bytes((resources.files("interpose") / "examples" / "walk.bvh").read_bytes())
+    return path
+
+
+def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")) -> None:
+    """See a gap filled in a real clip.
+
+    Someone walks, and the middle second is taken away. The demo fills it, compares
+    with plain interpolation and with what was taken away, and writes the filled
+    clip, a strip of stick figures, and a page that plays it in any browser.
+
+    Args:
+        out: the folder; files of an earlier demo in it are replaced.
+    """
+    from interpose import tasks
+    from interpose.cli.outputs import write_text
+    from interpose.formats import load, save
+    from interpose.observation import Gap
+    from interpose.show import Take, player, strip
+
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        path = example(out)
+    except OSError as error:
+        why = error.strerror or str(error)
+        raise FileError(f"cannot write into {out}", why, "Choose another folder with --out.") from None
+    clip = load(path)
+    gap = Gap(*GAP)
+    filled, plain = tasks.fill(clip, [gap]), tasks.fill(clip, [gap], "linear")
+    takes = [
+        Take("truth", clip.positions(), TRUTH, ghost=True),
+        Take("interpolation", plain.clip.positions(), PLAIN),
+        Take("filled", filled.clip.positions(), FILLED),
+    ]
+    text = str(filled.report)
+    save(filled.clip, out / "walk.filled.bvh", force=True)
+    joints, parents = clip.skeleton.names, clip.skeleton.parents
+    picture = strip(takes, parents, clip.fps, [gap], title="A second of a walk", names=joints)
+    write_text(out / "strip.svg", picture)
+    page = player(takes, parents, clip.fps, [gap], title="A second of a walk", report=text, names=joints)
+    write_text(out / "player.html", page)
+
+    method = filled.report.gaps[0].method
+    say(f"A walk of {clip.seconds:.1f} s from the CMU motion capture database (mocap.cs.cmu.edu).")
+    where = f"Frames {gap.start} to {gap.stop - 1} ({seconds(len(gap), clip.fps)})"
+    say(f"{where} were taken away and filled by {method}.")
+    say()
+    say_table(
+        ("", "seam", "bones", "foot slide", "foot travel", "error"),
+        [
+            _truth(clip, gap),
+            _row("linear interpolation", clip, plain, gap),
+            _row(f"filled ({method})", clip, filled, gap),
+        ],
+        right=("seam", "bones", "foot slide", "foot travel", "error"),
+    )
+    say(
+        "seam: largest velocity jump at the ends, cm/frame^2 (the clip's own 95th percentile is "
+        f"{filled.report.gaps[0].seam_limit or 0:.2f})\n"
+        "bones: largest change of a length; error: mean distance of all joints from what was taken away",
+        style="dim",
+    )
+    for note in filled.report.gaps[0].notes:
+        say(f"note: {note}")
+    say()
+    say(
+        f"Open   {out / 'player.html'} in a browser: truth, interpolation and the filled clip over each other"
+    )
+    say(f"       {out / 'strip.svg'}: the same as stick figures over time")
+    say(f"       {out / 'walk.filled.bvh'} in your own tool")
+    say("Then   interpose scan YOUR.bvh                        what is missing in your clip")
+    say("       interpose fill YOUR.bvh --gap 120:160 --player  fill frames 120 to 159 of it")
+
+
+def _row(name: str, clip: Clip, done: Completion, gap: Gap) -> list[str]:
+    from interpose.finish.measures import joint_error
+
+    inside = slice(gap.start, gap.stop)
+    wrong = joint_error(done.clip.positions()[inside], clip.positions()[inside])
+    one = done.report.gaps[0]
+    return [
+        name,
+        f"{one.seam_after or 0:.2f}",
+        f"{one.bone_deviation:.2f} cm",
+        f"{one.foot_slide or 0:.1f} cm/s",
+        f"{one.foot_travel or 0:.2f} m",
+        f"{100 * wrong:.1f} cm",
+    ]
+
+
+def _truth(clip: Clip, gap: Gap) -> list[str]:
+    """The same measures of what was taken away."""
+    import numpy as np
+
+    from interpose.finish import feet
+    from interpose.finish.measures import seam_jump
+    from interpose.observation import Observation
+
+    seen = Observation.from_gaps(clip, [gap])
+    slide, travel = feet.measure(clip, seen, gap.start, gap.stop) or (0.0, 0.0)
+    ends = np.array([gap.start - 1, gap.start, gap.stop - 1, gap.stop])
+    jump = 100 * seam_jump(clip.positions(), ends)
+    return ["truth", f"{jump:.2f}", "0.00 cm", f"{slide:.1f} cm/s", f"{travel:.2f} m", "0.0 cm"]

@@ -1,0 +1,46 @@
+"""interpose export: a trained network becomes weights that users can run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from cyclopts import App
+
+from interpose.cli.console import say
+from interpose.cli.research import needs_torch
+from interpose.cli.train import check_splits, load_packs
+from interpose.errors import FileError
+
+app = App(name="export", help="Turn a training run into weights with a card (needs PyTorch).")
+
+
+@app.command
+def cae(
+    *,
+    run: Path,
+    packs: Path = Path("packs"),
+    out: Path = Path("weights/cae"),
+    budget: str = "",
+    splits: list[str] = [],  # noqa: B006
+) -> None:
+    """Write cae.onnx, its card cae.json, and the training log with its curves.
+
+    Try:
+      interpose export cae --run runs/cae --packs packs --out weights/cae --budget 25m
+
+    Args:
+        run: the folder of the training run.
+        packs: the folder with the packs that it was trained on.
+        out: the folder for the weights.
+        budget: what the run was given; the card says it.
+        splits: what it was trained on: train (the default), or train,validation.
+    """
+    with needs_torch("export a network"):
+        from interpose.training.export import export_cae
+    chosen = check_splits(splits)
+    for name in ("averaged.pt", "log.jsonl"):
+        if not (run / name).is_file():
+            raise FileError(f"cannot export {run}", f"it has no {name}", "Train first: interpose train cae.")
+    card = export_cae(run, load_packs(packs), out, {"budget": budget} if budget else {}, list(chosen))
+    say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")
+    say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")

@@ -1,0 +1,154 @@
+"""interpose fill: fill gaps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from cyclopts import Parameter
+
+from interpose.cli.console import names, progress, say, say_json, say_table, seconds
+from interpose.cli.outputs import Outputs, finish, numbered
+from interpose.cli.reading import Reading, describe, details
+from interpose.errors import RequestError
+
+if TYPE_CHECKING:
+    from interpose.cli.request import Request
+    from interpose.clip import Clip
+    from interpose.observation import Gap
+
+
+def fill(
+    file: Path,
+    /,
+    *,
+    gap: list[str] = [],  # noqa: B006
+    joints: list[str] = [],  # noqa: B006
+    gaps: Path | None = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    method: str | None = None,
+    max_gap: int | None = None,
+    only_gap: list[int] = [],  # noqa: B006
+    seed: int | None = None,
+    player: bool = False,
+    dry_run: bool = False,
+    json: bool = False,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> int:
+    """Fill gaps in a clip; what is not missing comes back unchanged.
+
+    Writes the clip and a report beside the input: take.filled.bvh and
+    take.filled.json. Without --gap, --joints or --gaps it fills what
+    `interpose scan` finds.
+
+    Try:
+      interpose fill take.bvh --gap 120:160 --gap 200:230
+      interpose fill take.bvh --gap 120:160 --joints LeftArm,LeftForeArm --player
+      interpose fill take.bvh --max-gap 90 --only-gap 2 --method spline
+      interpose fill take.bvh --gaps take.filled.json -o again.bvh   (once more)
+
+    Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
+
+    Args:
+        file: the clip (.bvh, .npz).
+        gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
+        joints: the joints whose rotations are missing, separated by commas: in each --gap, or without one in
+            the whole clip. Without it the whole pose is missing.
+        gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
+        output: where to write the filled clip; the report goes beside it.
+        method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
+        max_gap: leave gaps of more than this many frames open, and list them.
+        only_gap: fill only the gap of this number, counted from 1 in order of time. May be repeated.
+        seed: for methods that sample.
+        player: write a page (take.filled.html) that plays the result; it opens in any browser.
+        dry_run: say what would be done, and write nothing.
+        json: print the report as JSON.
+        force: replace existing files.
+    """
+    from interpose import tasks
+    from interpose.cli.request import from_options, reading_of
+
+    clip = reading_of(gaps, reading).load(file)
+    request = from_options(file, clip, gap, joints, gaps)
+    if method is not None:
+        request = replace(request, method=method, methods={})
+    if only_gap:
+        request = replace(request, only=only_gap)
+    if seed is not None:
+        request = replace(request, seed=seed)
+    if max_gap is not None and max_gap < 1:
+        fix = "Write for example --max-gap 90."
+        raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
+    outputs = Outputs.choose(file, output, "filled", player)
+    outputs.check(file, force)
+    if dry_run:
+        return _dry_run(file, clip, request, max_gap, outputs, json)
+    missing = sum(map(len, request.gaps))
+    with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
+        done = tasks.fill(
+            clip,
+            request.gaps,
+            request.method,
+            max_gap=max_gap,
+            only=request.only,
+            seed=request.seed,
+            methods=request.methods,
+            progress=advance,
+        )
+    why = {number: _why(left, max_gap) for number, left in numbered(done)}
+    return finish("fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force)
+
+
+def _why(gap: Gap, max_gap: int | None) -> str:
+    """Why a gap stays open."""
+    if max_gap is not None and len(gap) > max_gap:
+        return f"longer than --max-gap {max_gap}"
+    return "not among the gaps chosen"
+
+
+def _dry_run(
+    file: Path, clip: Clip, request: Request, max_gap: int | None, outputs: Outputs, as_json: bool
+) -> int:
+    """Say what would be done."""
+    from interpose import tasks
+    from interpose.observation import Observation
+
+    seen = Observation.from_gaps(clip, request.gaps)
+    jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
+    left = any(job.method is None for job in jobs)
+    if as_json:
+        planned = [
+            {
+                "number": job.number,
+                "frames": f"{job.gap.start}:{job.gap.stop}",
+                "joints": None if job.gap.joints is None else list(job.gap.joints),
+                "method": job.method.name if job.method else None,
+            }
+            for job in jobs
+        ]
+        files = [str(path) for path in outputs.all]
+        say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files})
+        return 4 if left else 0
+    say("\n".join(describe(file, clip)))
+    if request.said:
+        say(request.said)
+    say()
+    say_table(
+        ("gap", "frames", "length", "joints", "would be filled by"),
+        [
+            (
+                str(job.number),
+                f"{job.gap.start}:{job.gap.stop}",
+                seconds(len(job.gap), clip.fps),
+                "" if job.gap.joints is None else names(job.gap.joints),
+                job.method.name if job.method else f"nothing: {_why(job.gap, max_gap)}",
+            )
+            for job in jobs
+        ],
+        right=("gap", "frames", "length"),
+    )
+    say()
+    say(f"a dry run: nothing is written. Without --dry-run: {', '.join(map(str, outputs.all))}")
+    return 4 if left else 0

@@ -1,0 +1,86 @@
+"""interpose models: what can fill a gap, and what there is to know about trained weights."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from interpose.cli.console import say, say_json, say_table
+
+METHODS = {
+    "auto": "what measured best for the length of a gap: short ones the spline, long ones a network",
+    "zero-velocity": "holds the last pose",
+    "linear": "straight line between the poses on both sides",
+    "spline": "smooth curve with the velocity on both sides; best for short gaps",
+    "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",
+}
+
+
+def models(name: str | None = None, /, *, json: bool = False) -> None:
+    """List the methods that fill gaps, and the trained models.
+
+    Try:
+      interpose models
+      interpose models cae
+
+    Args:
+        name: of a model: prints its whole card: training data, licence, limits, measured figures.
+        json: print JSON for other programs.
+    """
+    from interpose.methods import registry, weights
+
+    if name is not None:
+        card = weights.card(name).to_dict()
+        if json:
+            say_json(card)
+        else:
+            say("\n".join(_lines(card)))
+        return
+    cards = weights.cards()
+    names = dict.fromkeys(["auto", *registry.names()])
+    if json:
+        methods = [{"name": one, "description": METHODS.get(one, "from another package")} for one in names]
+        say_json({"methods": methods, "models": [card.to_dict() for card in cards]})
+        return
+    say_table(("method", "what it does"), [(one, METHODS.get(one, "from another package")) for one in names])
+    say()
+    if not cards:
+        say("No trained models are installed: auto uses the spline.")
+        return
+    say_table(
+        ("model", "method", "rate", "longest gap", "licence", "trained on"),
+        [
+            (
+                card.name,
+                card.method,
+                f"{card.fps:g} fps",
+                f"{card.max_gap / card.fps:g} s",
+                card.licence,
+                ", ".join(str(one.get("name", one)) for one in card.data),
+            )
+            for card in cards
+        ],
+        right=("rate", "longest gap"),
+    )
+    say()
+    say(f"interpose models {cards[0].name} prints the whole card.")
+
+
+def _lines(value: Any, indent: str = "") -> list[str]:
+    """A card as indented text."""
+    lines = []
+    for name, item in value.items():
+        title = str(name).replace("_", " ")
+        if isinstance(item, dict) and item:
+            lines += [f"{indent}{title}:", *_lines(item, indent + "  ")]
+        elif isinstance(item, list) and item and isinstance(item[0], dict):
+            lines.append(f"{indent}{title}:")
+            for one in item:
+                first, *rest = _lines(one, indent + "    ")
+                lines += [f"{indent}  - {first.strip()}", *rest]
+        elif isinstance(item, list):
+            lines.append(f"{indent}{title}: {', '.join(map(str, item))}")
+        elif item not in ({}, "", None):
+            lines.append(
+                f"{indent}{title}: {item:.4g}" if isinstance(item, float) else f"{indent}{title}: {item}"
+            )
+    return lines

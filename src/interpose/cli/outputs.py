@@ -1,0 +1,241 @@
+"""What `fill` and `recover` leave behind: the clip, the report that can be replayed, the page to look at."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from interpose import __version__
+from interpose.cli.console import names, say, say_json, say_table, seconds
+from interpose.cli.reading import describe, details
+from interpose.errors import FileError, RequestError
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+    from interpose.finish import Completion, GapReport
+    from interpose.observation import Gap
+
+# Units of the measures in a report, for whoever reads the JSON.
+UNITS = {
+    "solve_error": "cm",
+    "seam_before": "cm/frame^2",
+    "seam_after": "cm/frame^2",
+    "seam_limit": "cm/frame^2",
+    "bone_deviation": "cm",
+    "foot_slide": "cm/s",
+    "foot_slide_before": "cm/s",
+    "foot_travel": "m",
+    "drift": "cm",
+}
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """The files of one run, beside each other: clip, report and (if asked for) page."""
+
+    clip: Path
+    report: Path
+    page: Path | None
+
+    @classmethod
+    def choose(cls, file: Path, output: Path | None, done: str, player: bool) -> Outputs:
+        """take.bvh to take.filled.bvh, take.filled.json, take.filled.html; `output` names another clip."""
+        clip = output or file.with_name(f"{file.stem}.{done}{file.suffix}")
+        return cls(clip, clip.with_suffix(".json"), clip.with_suffix(".html") if player else None)
+
+    @property
+    def all(self) -> list[Path]:
+        return [path for path in (self.clip, self.report, self.page) if path is not None]
+
+    def check(self, file: Path, force: bool) -> None:
+        """Before any work: RequestError if something is in the way."""
+        from interpose.formats import FORMATS
+
+        if self.clip.suffix.lower() not in FORMATS:
+            raise RequestError(
+                f"cannot write {self.clip}",
+                f"the suffix {self.clip.suffix or '(none)'} names no format",
+                f"Supported are {', '.join(FORMATS)}.",
+            )
+        for path in self.all:
+            what = f"cannot write {path}"
+            if path.exists() and path.samefile(file):
+                raise RequestError(
+                    what, "it is the input, which stays as it is", "Choose another name with -o."
+                )
+            if path.is_dir():
+                raise RequestError(what, "it is a directory", "Name a file in it with -o.")
+            if not path.parent.is_dir():
+                raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
+            if path.exists() and not force:
+                raise RequestError(
+                    what, "the file exists already", "Choose another name with -o, or add --force."
+                )
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file whole or not at all. Raises FileError when it cannot be written."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        try:
+            part.write_text(text, encoding="utf-8")
+            os.replace(part, path)
+        finally:
+            part.unlink(missing_ok=True)
+    except OSError as error:
+        raise FileError(
+            f"cannot write {path}", error.strerror or str(error), "Choose another folder."
+        ) from None
+
+
+def numbered(completion: Completion) -> list[tuple[int, Gap]]:
+    """The gaps left open with their numbers: those that no filled gap has, in order of time."""
+    left = completion.report.open
+    taken = {gap.number for gap in completion.report.gaps}
+    free = [number for number in range(1, len(taken) + len(left) + 1) if number not in taken]
+    return list(zip(free, left))
+
+
+def to_json(
+    verb: str,
+    file: Path,
+    output: Path,
+    clip: Clip,
+    completion: Completion,
+    seed: int | None,
+    why: dict[int, str],
+) -> dict[str, Any]:
+    """The report as it is written beside the clip; `fill --gaps` replays it.
+
+    Args:
+        why: for the number of each open gap why it is open.
+    """
+    report = completion.report.to_dict()
+
+    def entry(number: int, gap: dict[str, Any]) -> dict[str, Any]:
+        joints = gap["joints"]
+        rest = {
+            name: value for name, value in gap.items() if name not in ("number", "start", "stop", "joints")
+        }
+        return {"number": number, "frames": f"{gap['start']}:{gap['stop']}", "joints": joints, **rest}
+
+    return {
+        "interpose": __version__,
+        "verb": verb,
+        "input": str(file),
+        "output": str(output),
+        **details(clip),
+        "method": report["method"],
+        "seed": seed,
+        "gaps": [entry(gap["number"], gap) for gap in report["gaps"]],
+        "open": [
+            {
+                "number": number,
+                "frames": f"{gap.start}:{gap.stop}",
+                "joints": None if gap.joints is None else list(gap.joints),
+                "why": why.get(number, ""),
+            }
+            for number, gap in numbered(completion)
+        ],
+        "units": UNITS,
+    }
+
+
+def finish(
+    verb: str,
+    file: Path,
+    outputs: Outputs,
+    clip: Clip,
+    completion: Completion,
+    seed: int | None,
+    why: dict[int, str],
+    said: str = "",
+    *,
+    json: bool,
+    force: bool,
+) -> int:
+    """Write everything, print the report, and return the exit code: 4 when a gap stays open."""
+    report = to_json(verb, file, outputs.clip, clip, completion, seed, why)
+    notes = write(outputs, force, clip, completion, report)
+    if json:
+        say_json(report)
+    else:
+        say("\n".join([*describe(file, clip), *([said] if said else []), ""]))
+        print_report(completion, clip.fps, why)
+        say(
+            "\n".join(["", *(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, outputs.all))}"])
+        )
+    return 4 if completion.report.open else 0
+
+
+def write(
+    outputs: Outputs, force: bool, clip: Clip, completion: Completion, report: dict[str, Any]
+) -> list[str]:
+    """Write all files; returns notes on what the format could not hold."""
+    from interpose.formats import save
+
+    page = compare(clip, completion, outputs.clip.name) if outputs.page else ""
+    notes = save(completion.clip, outputs.clip, force=force)
+    write_text(outputs.report, dumps(report, indent=2, allow_nan=False) + "\n")
+    if outputs.page:
+        write_text(outputs.page, page)
+    return list(notes)
+
+
+def compare(clip: Clip, completion: Completion, title: str) -> str:
+    """A page that plays the clip as it was, faintly, and as it is now."""
+    from interpose.show import Take, player
+
+    takes = [
+        Take("filled", completion.clip.positions(), "#d1495b"),
+        Take("input", clip.positions(), "#6b7280", ghost=True),
+    ]
+    gaps = [(gap.start, gap.stop) for gap in completion.report.gaps]
+    text, names_ = str(completion.report), clip.skeleton.names
+    return player(takes, clip.skeleton.parents, clip.fps, gaps, title=title, report=text, names=names_)
+
+
+def print_report(completion: Completion, fps: float, why: dict[int, str]) -> None:
+    """A line for each gap, then what is to be said about single ones, then what stayed open."""
+    gaps = completion.report.gaps
+    say_table(
+        ("gap", "frames", "length", "joints", "method", "seam", "bones", "slide", "travel", "drift"),
+        [_row(gap, fps) for gap in gaps],
+        right=("gap", "frames", "length", "seam", "bones", "slide", "travel", "drift"),
+    )
+    if gaps:
+        usual = (
+            f", the clip's own are below {gaps[0].seam_limit:.2f}" if gaps[0].seam_limit is not None else ""
+        )
+        legend = (
+            f"seam: largest velocity jump, cm/frame^2{usual}; bones: change of length, cm",
+            "slide, travel: of the feet, cm/s and m; drift: of the way before it was evened out, cm",
+        )
+        say("\n".join(legend), style="dim")
+    for gap in gaps:
+        for note in gap.notes:
+            say(f"gap {gap.number}: {note}")
+    for number, left in numbered(completion):
+        say(f"gap {number} stays open: {left} ({seconds(len(left), fps)}), {why.get(number, 'not filled')}")
+
+
+def _row(gap: GapReport, fps: float) -> list[str]:
+    def figure(value: float | None, digits: int = 2) -> str:
+        return "" if value is None else f"{value:.{digits}f}"
+
+    joints = "" if gap.joints is None else names(gap.joints, most=2)
+    return [
+        str(gap.number),
+        f"{gap.start}:{gap.stop}",
+        seconds(gap.stop - gap.start, fps),
+        joints,
+        gap.method if gap.model is None or gap.model == gap.method else f"{gap.method} ({gap.model})",
+        figure(gap.seam_after),
+        figure(gap.bone_deviation),
+        figure(gap.foot_slide, 1),
+        figure(gap.foot_travel),
+        figure(gap.drift, 1),
+    ]

@@ -1,0 +1,51 @@
+"""The options of every verb that reads a clip."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Group, Parameter
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+
+
+@Parameter(
+    name="*", group=Group("What a BVH file does not say (estimated, and printed, if not given)", sort_key=8)
+)
+@dataclass(frozen=True)
+class Reading:
+    """How to read a file that leaves something open."""
+
+    unit: Annotated[str | None, Parameter(help="m, cm, mm, inch, CMU, or metres per unit.")] = None
+    up: Annotated[str | None, Parameter(help="The axis that points up: y or z.")] = None
+    joint_positions: Annotated[
+        str | None,
+        Parameter(help="Position channels of joints replace their OFFSET, or add to it: replace or add."),
+    ] = None
+
+    def load(self, path: Path) -> Clip:
+        """The clip in a file."""
+        from interpose.formats import load
+
+        return load(path, self.unit, self.up, self.joint_positions)
+
+
+def describe(path: Path, clip: Clip) -> list[str]:
+    """What was read, and what was estimated, for a person."""
+    size = f"{len(clip)} frames at {clip.fps:.4g} fps ({clip.seconds:.1f} s), {len(clip.skeleton)} joints"
+    lines: tuple[str, ...] = clip.source.describe() if hasattr(clip.source, "describe") else ()
+    return [f"{path}: {size}", *(f"  {line}" for line in lines)]
+
+
+def details(clip: Clip) -> dict[str, Any]:
+    """The same for a program: how to read the file in the same way again."""
+    found: dict[str, Any] = {"frames": len(clip), "fps": clip.fps, "joints": len(clip.skeleton)}
+    source = clip.source
+    if hasattr(source, "unit"):
+        found |= {"unit": source.unit, "unit_how": source.unit_how, "up": source.up, "up_how": source.up_how}
+        if source.positions != "none":
+            found["joint_positions"] = source.positions
+    return found

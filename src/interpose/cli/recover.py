@@ -1,0 +1,68 @@
+"""interpose recover: joints that are missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from interpose.cli.console import progress
+from interpose.cli.outputs import Outputs, finish
+from interpose.cli.reading import Reading
+from interpose.errors import RequestError
+
+
+def recover(
+    file: Path,
+    /,
+    *,
+    joints: list[str],
+    frames: str | None = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    method: str = "auto",
+    seed: int | None = None,
+    player: bool = False,
+    json: bool = False,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> int:
+    """Recover joints that are missing in the whole clip or in a range.
+
+    Writes the clip and a report beside the input: take.recovered.bvh and
+    take.recovered.json.
+
+    Try:
+      interpose recover take.bvh --joints LeftArm,LeftForeArm,LeftHand
+      interpose recover take.bvh --joints RightFoot --frames 120:160
+
+    Args:
+        file: the clip (.bvh, .npz).
+        joints: the joints, separated by commas.
+        frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
+        output: where to write the clip; the report goes beside it.
+        method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
+        seed: for methods that sample.
+        player: write a page (take.recovered.html) that plays the result; it opens in any browser.
+        json: print the report as JSON.
+        force: replace existing files.
+    """
+    from interpose import tasks
+    from interpose.cli.request import split_names
+    from interpose.observation import Gap
+
+    chosen = split_names(joints)
+    if not chosen:
+        raise RequestError(
+            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
+        )
+    clip = reading.load(file)
+    gap = Gap.parse(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
+    gap.check(len(clip))
+    for name in chosen:
+        clip.skeleton.index(name)
+    outputs = Outputs.choose(file, output, "recovered", player)
+    outputs.check(file, force)
+    with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
+        done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
+    return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)

@@ -1,0 +1,135 @@
+"""What a command line asks to be filled: gaps from options, a file, an earlier report, or a scan."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from interpose.cli.reading import Reading
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.observation import Gap
+from interpose.observation.gapfile import read_gaps
+from interpose.observation.scan import scan, to_gaps
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is to be filled, and how.
+
+    Attributes:
+        gaps: what is missing.
+        method, methods: the method, and those of single gaps by number.
+        only: the numbers of the gaps to fill, None for all.
+        seed: for methods that sample.
+        said: lines for the user: where the gaps come from.
+    """
+
+    gaps: list[Gap]
+    method: str = "auto"
+    methods: dict[int, str] = field(default_factory=dict)
+    only: list[int] | None = None
+    seed: int | None = None
+    said: str = ""
+
+
+def split_names(texts: list[str]) -> tuple[str, ...]:
+    """Joint names from options that hold one or several, separated by commas."""
+    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
+
+
+def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], gaps: Path | None) -> Request:
+    """The request of `fill`. Raises RequestError when it does not fit the clip or nothing is missing."""
+    chosen = split_names(joints) or None
+    if joints and not chosen:
+        raise RequestError(
+            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
+        )
+    listed = [Gap.parse(text, chosen) for text in ranges]
+    if gaps is not None:
+        if chosen and not ranges:
+            why = "the file says which joints are missing"
+            fix = 'Write "joints": ["LeftArm"] into its entries.'
+            raise RequestError("--joints does not apply to --gaps", why, fix)
+        request = _replay(gaps)
+        if listed:
+            request = Request([*request.gaps, *listed])
+    elif listed:
+        request = Request(listed)
+    elif chosen:
+        request = Request([Gap(0, len(clip), chosen)])
+    else:
+        request = _scanned(file, clip)
+    for gap in request.gaps:
+        gap.check(len(clip))
+        for name in gap.joints or ():
+            clip.skeleton.index(name)
+    if not request.gaps:
+        raise RequestError(
+            f"nothing to fill in {file}", f"{gaps} lists no gaps", "Name one with --gap 120:160."
+        )
+    return request
+
+
+def _scanned(file: Path, clip: Clip) -> Request:
+    found = scan(clip)
+    gaps = to_gaps(found)
+    fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
+    if found and not gaps:
+        why = "a scan finds only positions that stand still, and a position alone cannot be filled"
+        raise RequestError(f"nothing to fill in {file}", why, fix)
+    if not gaps:
+        why = "no --gap is given, and a scan finds nothing missing"
+        raise RequestError(f"nothing to fill in {file}", why, fix)
+    lines = ["no --gap is given, so what a scan finds is filled:"]
+    lines += [
+        f"  {one.start}:{one.stop} {one.kind}, {one.note}" for one in found if one.kind != "frozen position"
+    ]
+    passed_over = [one for one in found if one.kind == "frozen position"]
+    lines += [f"  {one.start}:{one.stop} {one.kind} is not, as it is one alone" for one in passed_over]
+    return Request(gaps, said="\n".join(lines))
+
+
+def _replay(path: Path) -> Request:
+    """The gaps of a file; for a report, filled and open ones as they were, each by the method named in it."""
+    filled = read_gaps(path)
+    content = json.loads(path.read_text(encoding="utf-8"))
+    if not _is_report(content):
+        return Request(filled)
+    left = content["open"]
+    open_gaps = [
+        Gap.parse(one["frames"], None if one["joints"] is None else tuple(one["joints"])) for one in left
+    ]
+    methods: dict[int, set[str]] = {}
+    for entry in content["gaps"]:
+        methods.setdefault(entry["number"], set()).add(entry["method"])
+    return Request(
+        [*filled, *open_gaps],
+        content["method"],
+        # Long recoveries are reported in pieces, and where pieces differ the method asked for decides again.
+        {number: used.pop() for number, used in methods.items() if len(used) == 1},
+        sorted(methods) if left else None,
+        content["seed"],
+        f"as in {path}",
+    )
+
+
+def reading_of(path: Path | None, reading: Reading) -> Reading:
+    """How to read the clip: as told, or else as a report says that it was read."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8")) if path else None
+    except (OSError, ValueError, RecursionError):
+        return reading  # `from_options` says what is wrong with the file
+    if content is None or not _is_report(content):
+        return reading
+    unit, up, positions = (content.get(key) for key in ("unit", "up", "joint_positions"))
+    return Reading(
+        reading.unit or (repr(unit) if unit else None), reading.up or up, reading.joint_positions or positions
+    )
+
+
+def _is_report(content: Any) -> bool:
+    """Whether a file is a report that this program wrote, whole."""
+    return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()

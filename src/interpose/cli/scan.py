@@ -1,0 +1,57 @@
+"""interpose scan: find what is missing."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from interpose.cli.console import names, say, say_json, say_table, seconds
+from interpose.cli.reading import Reading, describe, details
+
+
+def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
+    """Find what looks missing: frozen runs and stray rest poses.
+
+    Try:
+      interpose scan take.bvh
+
+    Args:
+        file: the clip (.bvh, .npz).
+        json: print JSON for other programs.
+    """
+    from interpose.observation.scan import scan, to_gaps
+
+    clip = reading.load(file)
+    found = scan(clip)
+    if json:
+        findings = [
+            {
+                "kind": one.kind,
+                "frames": f"{one.start}:{one.stop}",
+                "joints": None if one.joints is None else list(one.joints),
+                "seconds": len(one) / clip.fps,
+                "note": one.note,
+            }
+            for one in found
+        ]
+        say_json({"input": str(file), **details(clip), "findings": findings})
+        return
+    say("\n".join(describe(file, clip)))
+    if not found:
+        say("nothing looks missing")
+        return
+    say()
+    say_table(
+        ("kind", "frames", "length", "joints", "note"),
+        [
+            (one.kind, f"{one.start}:{one.stop}", seconds(len(one), clip.fps), names(one.joints), one.note)
+            for one in found
+        ],
+        right=("frames", "length"),
+    )
+    say()
+    if to_gaps(found):
+        say(f"interpose fill {file} fills these; --gap START:STOP names one yourself.")
+    else:
+        say(
+            "A position alone cannot be filled; name the frames of the whole pose with fill --gap START:STOP."
+        )

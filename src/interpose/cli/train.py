@@ -1,0 +1,63 @@
+"""interpose train: one command a recipe."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from cyclopts import App
+
+from interpose.cli.console import say
+from interpose.cli.request import split_names
+from interpose.cli.research import needs_torch
+from interpose.errors import FileError, RequestError
+
+if TYPE_CHECKING:
+    from interpose.datasets import Pack
+
+app = App(name="train", help="Train a network (needs PyTorch: pip install 'interpose[train]').")
+SPLITS = ("train", "validation")
+
+
+def load_packs(folder: Path) -> list[Pack]:
+    """The packs in a folder, by name. Raises FileError when there are none."""
+    from interpose.datasets import Pack
+
+    paths = sorted(folder.glob("*.npz"))
+    if not paths:
+        raise FileError(
+            f"no packs in {folder}", "it has no .npz file", f"Make them: interpose data pack --out {folder}"
+        )
+    return [Pack.load(path) for path in paths]
+
+
+def check_splits(texts: list[str]) -> tuple[str, ...]:
+    """The splits to train on; never the test performers."""
+    splits = split_names(texts) or ("train",)
+    if bad := [split for split in splits if split not in SPLITS]:
+        why = "networks train on train, in a final run also on validation, and never on test"
+        raise RequestError(
+            f"cannot train on {', '.join(bad)}", why, "Write --splits train or --splits train,validation."
+        )
+    return splits
+
+
+@app.command
+def cae(*, packs: Path = Path("packs"), out: Path, budget: str = "25m", splits: list[str] = []) -> None:  # noqa: B006
+    """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
+
+    Try:
+      interpose train cae --packs packs --out runs/cae --budget 25m
+
+    Args:
+        packs: the folder with the packs to train on: `interpose data pack` makes them.
+        out: the folder of the run: checkpoints and the log.
+        budget: device time or steps: 25m, 3h, 6000steps.
+        splits: train (the default); train,validation for a final run of fixed budget.
+    """
+    with needs_torch("train a network"):
+        from interpose.training.budget import Budget
+        from interpose.training.cae import train_cae
+    chosen = check_splits(splits)
+    train_cae(load_packs(packs), out, Budget.parse(budget), splits=chosen, say=say)
+    say(f"done: {out}. Next: interpose export cae --run {out} --packs {packs} --out weights/cae")
