@@ -112,13 +112,16 @@ def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
     nothing is placed at all, frame 0.
     """
     length = placed.shape[1]
-    frame = torch.arange(length, device=placed.device)
-    past = (frame[None, :] <= frame[:, None]) & placed[:, None, :]
-    future = (frame[None, :] >= frame[:, None]) & placed[:, None, :]
-    last = torch.where(past, frame, -1).amax(2)
-    first = torch.where(future, frame, length).amin(2)
-    last, first = torch.where(last >= 0, last, first), torch.where(first < length, first, last)
-    return torch.where(last < length, last, 0), torch.where(first >= 0, first, 0)
+    frame = torch.arange(length, device=placed.device).expand_as(placed)
+    rank = torch.cumsum(placed.long(), dim=1)
+    count = rank[:, -1:]
+    # The k-th placed frame stands in slot k; slot 0 takes all others and is never asked for.
+    table = torch.zeros(placed.shape[0], length + 1, dtype=torch.long, device=placed.device)
+    table = table.scatter(1, torch.where(placed, rank, 0), frame)
+    last = table.gather(1, torch.minimum(torch.clamp(rank, min=1), count))
+    first = table.gather(1, torch.minimum(torch.where(placed, rank, rank + 1), count))
+    nothing = count == 0
+    return torch.where(nothing, 0, last), torch.where(nothing, 0, first)
 
 
 def integrate(rows: Tensor, image: Image) -> tuple[Tensor, Tensor, Tensor, Tensor]:

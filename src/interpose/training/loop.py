@@ -6,6 +6,7 @@ import copy
 import json
 import math
 import os
+import pickle
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -88,7 +89,7 @@ class Trainer:
             self.model.load_state_dict(state["model"])
             self.averaged.load_state_dict(state["averaged"])
             self.optimizer.load_state_dict(state["optimizer"])
-        except (RuntimeError, KeyError, EOFError, OSError) as reason:
+        except (RuntimeError, KeyError, EOFError, OSError, pickle.UnpicklingError) as reason:
             raise FileError(
                 f"cannot go on from {path}", str(reason).splitlines()[0], "Delete it or name another folder."
             ) from None
