@@ -54,8 +54,7 @@ def fill(
     Args:
         file: the clip (.bvh, .npz).
         gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
-        joints: the joints whose rotations are missing, separated by commas: in each --gap, or without one in
-            the whole clip. Without it the whole pose is missing.
+        joints: the joints that are missing, separated by commas: in each --gap, or else in the whole clip.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
@@ -75,7 +74,7 @@ def fill(
     if method is not None:
         request = replace(request, method=method, methods={})
     if only_gap:
-        request = replace(request, only=only_gap)
+        request = replace(request, only=only_gap, why={})
     if seed is not None:
         request = replace(request, seed=seed)
     if max_gap is not None and max_gap < 1:
@@ -97,7 +96,7 @@ def fill(
             methods=request.methods,
             progress=advance,
         )
-    why = {number: _why(left, max_gap) for number, left in numbered(done)}
+    why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
     return finish("fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force)
 
 

@@ -1,4 +1,4 @@
-"""The options of every verb that reads a clip."""
+"""The options of every verb that reads a clip, and what is said of the clip."""
 
 from __future__ import annotations
 
@@ -33,6 +33,11 @@ class Reading:
         return load(path, self.unit, self.up, self.joint_positions)
 
 
+def split_names(texts: list[str]) -> tuple[str, ...]:
+    """Names from options that hold one or several, separated by commas."""
+    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
+
+
 def describe(path: Path, clip: Clip) -> list[str]:
     """What was read, and what was estimated, for a person."""
     size = f"{len(clip)} frames at {clip.fps:.4g} fps ({clip.seconds:.1f} s), {len(clip.skeleton)} joints"
@@ -47,5 +52,5 @@ def details(clip: Clip) -> dict[str, Any]:
     if hasattr(source, "unit"):
         found |= {"unit": source.unit, "unit_how": source.unit_how, "up": source.up, "up_how": source.up_how}
         if source.positions != "none":
-            found["joint_positions"] = source.positions
+            found |= {"joint_positions": source.positions, "joint_positions_how": source.positions_how}
     return found

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from interpose.cli.console import progress
 from interpose.cli.outputs import Outputs, finish
-from interpose.cli.reading import Reading
+from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
 
 
@@ -48,7 +48,6 @@ def recover(
         force: replace existing files.
     """
     from interpose import tasks
-    from interpose.cli.request import split_names
     from interpose.observation import Gap
 
     chosen = split_names(joints)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from interpose.cli.reading import Reading
+from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.observation import Gap
@@ -24,6 +24,7 @@ class Request:
         method, methods: the method, and those of single gaps by number.
         only: the numbers of the gaps to fill, None for all.
         seed: for methods that sample.
+        why: why a gap stays open, by number, where an earlier report says it.
         said: lines for the user: where the gaps come from.
     """
 
@@ -32,12 +33,8 @@ class Request:
     methods: dict[int, str] = field(default_factory=dict)
     only: list[int] | None = None
     seed: int | None = None
+    why: dict[int, str] = field(default_factory=dict)
     said: str = ""
-
-
-def split_names(texts: list[str]) -> tuple[str, ...]:
-    """Joint names from options that hold one or several, separated by commas."""
-    return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
 
 
 def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], gaps: Path | None) -> Request:
@@ -112,6 +109,7 @@ def _replay(path: Path) -> Request:
         {number: used.pop() for number, used in methods.items() if len(used) == 1},
         sorted(methods) if left else None,
         content["seed"],
+        {one["number"]: one["why"] for one in left},
         f"as in {path}",
     )
 
@@ -124,10 +122,12 @@ def reading_of(path: Path | None, reading: Reading) -> Reading:
         return reading  # `from_options` says what is wrong with the file
     if content is None or not _is_report(content):
         return reading
-    unit, up, positions = (content.get(key) for key in ("unit", "up", "joint_positions"))
-    return Reading(
-        reading.unit or (repr(unit) if unit else None), reading.up or up, reading.joint_positions or positions
-    )
+    said = {
+        name: str(content[name])
+        for name in ("unit", "up", "joint_positions")
+        if content.get(f"{name}_how") == "given" and getattr(reading, name) is None
+    }
+    return replace(reading, **said)
 
 
 def _is_report(content: Any) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from cyclopts import App
 
 from interpose.cli.console import say
-from interpose.cli.request import split_names
+from interpose.cli.reading import split_names
 from interpose.cli.research import needs_torch
 from interpose.errors import FileError, RequestError
 

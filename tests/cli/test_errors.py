@@ -1,0 +1,217 @@
+"""Bad input: three lines on stderr, the right exit code, nothing written, no traceback."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import interpose.cli
+from interpose.errors import FileError
+
+
+def three_lines(err: str) -> list[str]:
+    lines = err.rstrip("\n").split("\n")
+    assert len(lines) == 3, err
+    assert lines[0].startswith("error: ")
+    assert all(line.startswith("  ") and line.strip() for line in lines[1:])
+    return lines
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--gap", "80:60"], "80:60"),
+        (["--gap", "60:60"], "60:60"),
+        (["--gap", "100:200"], "163 frames"),
+        (["--gap", "-5:20"], "-5:20"),
+        (["--gap", "60-80"], "--gap 120:160"),
+        (["--gap", "60:80", "--joints", "LeftArn"], "Did you mean LeftArm"),
+        (["--gap", "60:80", "--joints", ","], "--joints"),
+        (["--joints", "leftarm"], "Did you mean LeftArm"),
+        (["--gap", "60:80", "--method", "splin"], "spline"),
+        (["--gap", "60:80", "--max-gap", "0"], "--max-gap"),
+        (["--gap", "60:80", "--max-gap", "many"], "whole number"),
+        (["--gap", "60:80", "--only-gap", "7"], "7"),
+        (["--gap", "60:80", "-o", "out.fbx"], ".bvh"),
+        (["--gap", "60:80", "-o", "no/such/out.bvh"], "no/such"),
+        (["--gap", "60:80", "-o", "out"], ".bvh"),
+        (["--gap", "60:80", "--unit", "furlong"], "inch"),
+        (["--gap", "60:80", "--up", "x"], "up axis"),
+        (["--gap", "60:80", "--gab", "1"], "Did you mean --gap"),
+        (["--gap"], "--gap"),
+        (["--gap", "60:80", "other.bvh"], "other.bvh"),
+    ],
+)
+def test_wrong_usage(run, take, options, says):
+    done = run("fill", "take.bvh", *options)
+    assert done.code == 2
+    assert says in done.err
+    assert "Traceback" not in done.err
+    assert done.out == ""
+    three_lines(done.err)
+    assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
+
+
+@pytest.mark.parametrize("verb", ["scan", "fill", "recover", "convert"])
+def test_an_input_is_asked_for(run, verb):
+    done = run(verb)
+    assert done.code == 2
+    assert "missing" in three_lines(done.err)[0]
+    assert f"interpose {verb} --help" in done.err
+
+
+def test_a_verb_that_does_not_exist(run):
+    done = run("fil", "take.bvh")
+    assert done.code == 2
+    assert "Did you mean fill" in three_lines(done.err)[2]
+
+
+def damaged(take: Path, kind: str) -> None:
+    text = take.read_text()
+    lines = text.splitlines(keepends=True)
+    damage = {
+        "truncated": text[: len(text) // 2],
+        "too many frames": text.replace("Frames: 163", "Frames: 170"),
+        "short line": "".join([*lines[:-3], "1 2 3\n", *lines[-2:]]),
+        "word": "".join([*lines[:-3], lines[-3].replace(" ", " oops ", 1), *lines[-2:]]),
+        "nan": "".join([*lines[:-3], "nan" + lines[-3][lines[-3].index(" ") :], *lines[-2:]]),
+        "zero frame time": text.replace("Frame Time: .0333333", "Frame Time: 0"),
+        "no bones": "\n".join("OFFSET 0 0 0" if "OFFSET" in line else line for line in text.splitlines()),
+        "empty": "",
+        "text": "Dear Sir or Madam\n",
+    }
+    take.write_text(damage[kind])
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        "truncated",
+        "too many frames",
+        "short line",
+        "word",
+        "nan",
+        "zero frame time",
+        "no bones",
+        "empty",
+        "text",
+    ],
+)
+def test_damaged_files(run, take, kind):
+    damaged(take, kind)
+    for command in (["scan", "take.bvh"], ["fill", "take.bvh", "--gap", "60:80"]):
+        done = run(*command)
+        assert done.code == 3, done.err
+        assert "take.bvh" in three_lines(done.err)[0]
+    assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
+
+
+def test_files_that_are_none(run, tmp_path):
+    (tmp_path / "folder.bvh").mkdir()
+    (tmp_path / "binary.bvh").write_bytes(bytes(range(256)) * 40)
+    (tmp_path / "binary.npz").write_bytes(bytes(range(256)) * 40)
+    for name in ("folder.bvh", "binary.bvh", "binary.npz", "missing.bvh"):
+        done = run("scan", name)
+        assert done.code == 3
+        assert name in three_lines(done.err)[0]
+    done = run("scan", "foldr.bvh")
+    assert "Did you mean folder.bvh" in done.err
+
+
+@pytest.mark.parametrize(
+    ("text", "code"),
+    [("{", 3), ('{"gap": []}', 3), ('[{"frames": "9"}]', 3), ("[]", 2), ('[{"frames": "150:200"}]', 2)],
+)
+def test_bad_gap_files(run, take, text, code):
+    take.with_name("gaps.json").write_text(text)
+    done = run("fill", "take.bvh", "--gaps", "gaps.json")
+    assert done.code == code
+    three_lines(done.err)
+    assert not take.with_name("take.filled.bvh").exists()
+
+
+def test_joints_do_not_go_with_a_file_of_gaps(run, take):
+    take.with_name("gaps.json").write_text('[{"frames": "20:30"}]')
+    done = run("fill", "take.bvh", "--gaps", "gaps.json", "--joints", "LeftArm")
+    assert done.code == 2
+    assert "--gaps" in three_lines(done.err)[0]
+
+
+def break_loading(monkeypatch: pytest.MonkeyPatch, error: BaseException) -> None:
+    def load(*args: object, **options: object) -> None:
+        raise error
+
+    monkeypatch.setattr("interpose.formats.load", load)
+
+
+def test_faults_of_the_program_show_no_traceback(run, take, monkeypatch):
+    break_loading(monkeypatch, KeyError("left"))
+    done = run("scan", "take.bvh")
+    assert done.code == 1
+    assert "--debug" in three_lines(done.err)[2]
+
+
+def test_debug_shows_where_an_error_comes_from(run, take, monkeypatch):
+    break_loading(monkeypatch, FileError("what", "why", "fix"))
+    assert run("scan", "take.bvh").code == 3
+    with pytest.raises(FileError):
+        run("scan", "take.bvh", "--debug")
+    monkeypatch.setenv("INTERPOSE_DEBUG", "1")
+    with pytest.raises(FileError):
+        run("scan", "take.bvh")
+
+
+def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch):
+    def interrupted(*args: object) -> None:
+        args[1].write(b"half of it")  # type: ignore[attr-defined]
+        raise KeyboardInterrupt
+
+    from interpose.formats import FORMATS
+
+    monkeypatch.setitem(FORMATS, ".bvh", FORMATS[".bvh"]._replace(write=interrupted))
+    done = run("fill", "take.bvh", "--gap", "60:80", "--method", "linear")
+    assert done.code == 130
+    assert done.err == ""
+    assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
+
+
+def start(*tokens: str, cwd: Path, **options: object) -> subprocess.Popen:
+    source = str(Path(interpose.cli.__file__).parents[2])
+    path = os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])
+    return subprocess.Popen(
+        [sys.executable, "-m", "interpose", *tokens],
+        cwd=cwd,
+        env=os.environ | {"PYTHONPATH": path},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,  # type: ignore[call-overload]
+    )
+
+
+def test_a_broken_pipe_is_quiet(take):
+    process = start("scan", "take.bvh", "--json", cwd=take.parent)
+    assert process.stdout is not None
+    process.stdout.close()
+    assert process.stderr is not None
+    assert process.stderr.read() == ""
+    process.wait()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
+def test_control_c_in_a_process(tmp_path):
+    """Interrupted while it waits for its input."""
+    os.mkfifo(tmp_path / "gaps.json")
+    (tmp_path / "take.bvh").write_text("")
+    process = start("fill", "take.bvh", "--gaps", "gaps.json", cwd=tmp_path)
+    time.sleep(1.5)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert (out, err) == ("", "")

@@ -1,0 +1,252 @@
+"""interpose fill, recover and convert: what is written, what is not, and what they end with."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from interpose.formats import load, save
+
+
+def frame_lines(path: Path) -> list[str]:
+    return path.read_text().splitlines()[-163:]
+
+
+def test_a_gap_is_filled_beside_the_input_and_nothing_else_changes(run, take):
+    before = take.read_bytes()
+    done = run("fill", "take.bvh", "--gap", "60:80", "--method", "spline")
+    assert done.code == 0
+    assert done.err == ""
+    assert sorted(path.name for path in take.parent.iterdir()) == [
+        "take.bvh",
+        "take.filled.bvh",
+        "take.filled.json",
+    ]
+    assert take.read_bytes() == before
+    old, new = frame_lines(take), frame_lines(take.with_name("take.filled.bvh"))
+    assert new[:60] + new[80:] == old[:60] + old[80:]
+    assert all(a != b for a, b in zip(new[60:80], old[60:80]))
+    assert "60:80" in done.out
+    assert "spline" in done.out
+    assert "estimated from a leg" in done.out
+
+
+def test_the_report_says_what_was_done(run, take):
+    done = run("fill", "take.bvh", "--gap", "60:80", "--method", "spline", "--json")
+    written = json.loads(take.with_name("take.filled.json").read_text())
+    assert done.json == written
+    assert written["input"] == "take.bvh"
+    assert written["output"] == "take.filled.bvh"
+    assert written["unit"] == pytest.approx(0.0254 / 0.45)
+    (gap,) = written["gaps"]
+    assert gap["number"] == 1
+    assert gap["frames"] == "60:80"
+    assert gap["method"] == "spline"
+    assert gap["foot_travel"] > 0
+    assert set(written["units"]) <= gap.keys()
+    assert written["open"] == []
+
+
+def test_existing_outputs_stay_without_force(run, take):
+    for name in ("take.filled.bvh", "take.filled.json"):
+        existing = take.with_name(name)
+        existing.write_text("mine")
+        done = run("fill", "take.bvh", "--gap", "60:80", "--method", "linear")
+        assert done.code == 2
+        assert name in done.err
+        assert "--force" in done.err
+        assert existing.read_text() == "mine"
+        existing.unlink()
+    take.with_name("take.filled.bvh").write_text("mine")
+    assert run("fill", "take.bvh", "--gap", "60:80", "--method", "linear", "--force").code == 0
+    assert take.with_name("take.filled.bvh").read_text().startswith("HIERARCHY")
+
+
+def test_the_input_is_never_overwritten(run, take):
+    before = take.read_bytes()
+    for verb in (
+        ["fill", "take.bvh", "--gap", "60:80", "-o", "take.bvh"],
+        ["convert", "take.bvh", "take.bvh"],
+    ):
+        done = run(*verb, "--force")
+        assert done.code == 2
+        assert "input" in done.err
+    assert take.read_bytes() == before
+
+
+def test_a_report_is_replayed_to_the_same_bytes(run, take):
+    first = run(
+        "fill", "take.bvh", "--gap", "20:26", "--gap", "60:100", "--gap", "120:150", "--max-gap", "35"
+    )
+    assert first.code == 4
+    again = run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh")
+    assert again.code == 4
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+    mine, theirs = (
+        json.loads(take.with_name(name).read_text()) for name in ("again.json", "take.filled.json")
+    )
+    assert mine | {"output": ""} == theirs | {"output": ""}
+
+
+def test_a_replay_uses_the_method_and_the_unit_of_the_report(run, take):
+    run("fill", "take.bvh", "--gap", "60:80", "--method", "linear", "--unit", "inch")
+    done = run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh", "--json").json
+    assert done["gaps"][0]["method"] == "linear"
+    assert done["unit"] == 0.0254
+    other = run(
+        "fill", "take.bvh", "--gaps", "take.filled.json", "-o", "other.bvh", "--method", "spline", "--json"
+    ).json
+    assert other["gaps"][0]["method"] == "spline"
+
+
+def test_long_gaps_stay_open_and_are_listed(run, take):
+    done = run(
+        "fill", "take.bvh", "--gap", "20:30", "--gap", "60:120", "--max-gap", "40", "--method", "spline"
+    )
+    assert done.code == 4
+    assert "gap 2 stays open: 60:120 (2.00 s), longer than --max-gap 40" in done.out
+    old, new = frame_lines(take), frame_lines(take.with_name("take.filled.bvh"))
+    assert new[30:] == old[30:]
+    (left,) = json.loads(take.with_name("take.filled.json").read_text())["open"]
+    assert (left["number"], left["frames"]) == (2, "60:120")
+
+
+def test_only_one_gap(run, take):
+    done = run(
+        "fill",
+        "take.bvh",
+        "--gap",
+        "100:110",
+        "--gap",
+        "20:30",
+        "--only-gap",
+        "2",
+        "--method",
+        "spline",
+        "--json",
+    )
+    assert done.code == 4
+    assert [gap["frames"] for gap in done.json["gaps"]] == ["100:110"]
+    assert [(gap["number"], gap["frames"]) for gap in done.json["open"]] == [(1, "20:30")]
+    assert run("fill", "take.bvh", "--gap", "20:30", "--only-gap", "2", "--force").code == 2
+
+
+def test_a_dry_run_writes_nothing(run, take):
+    done = run(
+        "fill", "take.bvh", "--gap", "20:30", "--gap", "60:120", "--max-gap", "40", "--dry-run", "--player"
+    )
+    assert done.code == 4
+    assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
+    assert "longer than --max-gap 40" in done.out
+    assert "take.filled.html" in done.out
+    planned = run("fill", "take.bvh", "--gap", "20:30", "--method", "linear", "--dry-run", "--json").json
+    assert planned["would_fill"] == [{"number": 1, "frames": "20:30", "joints": None, "method": "linear"}]
+
+
+def test_joints_in_a_range_and_in_the_whole_clip(run, take):
+    ranged = run(
+        "fill",
+        "take.bvh",
+        "--gap",
+        "60:80",
+        "--joints",
+        "LeftArm, LeftForeArm",
+        "--method",
+        "spline",
+        "--json",
+    )
+    assert ranged.code == 0
+    assert ranged.json["gaps"][0]["joints"] == ["LeftArm", "LeftForeArm"]
+    old, new = load(take), load(take.with_name("take.filled.bvh"))
+    changed = (old.rotation != new.rotation).any(axis=(0, 2))
+    assert {old.skeleton.names[j] for j in np.flatnonzero(changed)} <= {"LeftArm", "LeftForeArm"}
+    assert changed.any()
+    whole = run("fill", "take.bvh", "--joints", "LeftHand", "--method", "linear", "-o", "whole.bvh", "--json")
+    assert whole.json["gaps"][0]["frames"] == "0:163"
+
+
+def test_recover(run, take):
+    done = run("recover", "take.bvh", "--joints", "LeftForeArm", "--frames", "60:80", "--method", "spline")
+    assert done.code == 0
+    assert sorted(path.name for path in take.parent.iterdir()) == [
+        "take.bvh",
+        "take.recovered.bvh",
+        "take.recovered.json",
+    ]
+
+
+def test_gaps_from_a_file(run, take, tmp_path):
+    (tmp_path / "gaps.json").write_text('[{"frames": "20:30"}, {"frames": [60, 70], "joints": ["LeftArm"]}]')
+    done = run("fill", "take.bvh", "--gaps", "gaps.json", "--method", "spline", "--json")
+    assert [(gap["frames"], gap["joints"]) for gap in done.json["gaps"]] == [
+        ("20:30", None),
+        ("60:70", ["LeftArm"]),
+    ]
+
+
+def test_without_gaps_a_scan_decides(run, take):
+    nothing = run("fill", "take.bvh")
+    assert nothing.code == 2
+    assert "a scan finds nothing missing" in nothing.err
+    assert "--gap 120:160" in nothing.err
+    freeze(take)
+    done = run("fill", "take.bvh", "--method", "spline")
+    assert done.code == 0
+    assert "what a scan finds is filled" in done.out
+    # One of the equal frames may be the good one.
+    assert json.loads(take.with_name("take.filled.json").read_text())["gaps"][0]["frames"] in (
+        "60:80",
+        "61:80",
+    )
+
+
+def test_scan(run, take):
+    assert "nothing looks missing" in run("scan", "take.bvh").out
+    assert run("scan", "take.bvh", "--json").json["findings"] == []
+    freeze(take)
+    done = run("scan", "take.bvh")
+    assert done.code == 0
+    assert "frozen" in done.out
+    (finding,) = run("scan", "take.bvh", "--json").json["findings"]
+    assert finding["kind"] == "frozen"
+    assert finding["frames"] in ("60:80", "61:80")
+
+
+def freeze(path: Path) -> None:
+    """Frames 60 to 79 all like frame 60."""
+    lines = path.read_text().splitlines(keepends=True)
+    first = len(lines) - 163
+    lines[first + 61 : first + 80] = [lines[first + 60]] * 19
+    path.write_text("".join(lines))
+
+
+def test_the_player_page_is_written(run, take):
+    run("fill", "take.bvh", "--gap", "60:80", "--method", "linear", "-o", "out.bvh", "--player")
+    page = take.with_name("out.html").read_text()
+    assert "<html" in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+
+
+def test_convert(run, take):
+    assert run("convert", "take.bvh", "take.npz").code == 0
+    assert run("convert", "take.npz", "back.bvh").code == 0
+    old, new = load(take), load(take.with_name("back.bvh"))
+    np.testing.assert_allclose(new.positions(), old.positions(), atol=1e-5)
+    assert run("convert", "take.bvh", "copy.bvh").code == 0
+    assert take.with_name("copy.bvh").read_bytes() == take.read_bytes()
+    assert run("convert", "take.bvh", "slow.bvh", "--fps", "15").code == 0
+    slow = load(take.with_name("slow.bvh"))
+    assert len(slow) == 82
+    assert slow.fps == pytest.approx(15, abs=1e-3)
+    assert run("convert", "take.bvh", "slow.bvh").code == 2
+
+
+def test_npz_in_npz_out(run, take):
+    save(load(take), take.with_suffix(".npz"))
+    done = run("fill", "take.npz", "--gap", "60:80", "--method", "spline")
+    assert done.code == 0
+    assert take.with_name("take.filled.npz").exists()
+    assert "unit" not in json.loads(take.with_name("take.filled.json").read_text())

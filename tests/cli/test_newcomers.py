@@ -1,0 +1,170 @@
+"""Help, version, demo, models, doctor, and the researchers' verbs as far as they go without data."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import interpose
+from interpose.formats import load
+
+SOURCE = Path(interpose.__file__).parents[1]
+
+
+def test_help_imports_nothing_heavy(tmp_path):
+    """What makes `interpose --help` start quickly: neither NumPy nor what stands on it is imported."""
+    code = (
+        f"import sys; sys.path.insert(0, {str(SOURCE)!r})\n"
+        "from interpose.cli import main\n"
+        "code = main(['--help'])\n"
+        "heavy = {'torch', 'onnxruntime', 'scipy', 'numpy', 'rich.markdown', 'matplotlib'} & set(sys.modules)\n"
+        "sys.exit(f'imported: {heavy}' if heavy else code)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for verb in (
+        "scan",
+        "fill",
+        "recover",
+        "convert",
+        "demo",
+        "models",
+        "doctor",
+        "bench",
+        "data",
+        "train",
+        "export",
+    ):
+        assert verb in done.stdout
+
+
+@pytest.mark.parametrize(
+    "verb", ["scan", "fill", "recover", "convert", "demo", "models", "doctor", "bench", "data"]
+)
+def test_every_verb_explains_itself(run, verb):
+    done = run(verb, "--help")
+    assert done.code == 0
+    assert f"Usage: interpose {verb}" in done.out
+
+
+def test_the_help_of_fill_shows_how(run):
+    out = run("fill", "--help").out
+    assert "interpose fill take.bvh --gap 120:160" in out
+    for option in (
+        "--joints",
+        "--gaps",
+        "--max-gap",
+        "--only-gap",
+        "--dry-run",
+        "--player",
+        "--force",
+        "--unit",
+        "--up",
+    ):
+        assert option in out
+    assert "--no-json" not in out
+    assert "--empty" not in out
+
+
+def test_version(run):
+    project = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"]
+    assert interpose.__version__ == project["version"]
+    assert run("--version").out.strip() == f"interpose {interpose.__version__}"
+
+
+def test_demo(run, tmp_path):
+    for _ in range(2):  # it owns its folder
+        done = run("demo", "--out", "here")
+        assert done.code == 0, done.err
+    files = {path.name for path in (tmp_path / "here").iterdir()}
+    assert files == {"walk.bvh", "walk.filled.bvh", "strip.svg", "player.html"}
+    clip, filled = load(tmp_path / "here/walk.bvh"), load(tmp_path / "here/walk.filled.bvh")
+    changed = (clip.rotation != filled.rotation).any(axis=(1, 2))
+    assert changed[66:96].all()
+    assert changed.sum() == 30
+    for word in (
+        "truth",
+        "linear interpolation",
+        "filled (",
+        "mocap.cs.cmu.edu",
+        "player.html",
+        "interpose fill",
+    ):
+        assert word in done.out
+
+
+def test_demo_needs_a_folder(run, tmp_path):
+    (tmp_path / "demo").write_text("a file")
+    done = run("demo")
+    assert done.code == 3
+    assert "--out" in done.err
+
+
+def test_models(run):
+    done = run("models")
+    assert done.code == 0
+    for method in ("auto", "linear", "spline", "zero-velocity"):
+        assert method in done.out
+    listed = run("models", "--json").json
+    for card in listed["models"]:
+        assert card["licence"]
+        assert card["name"] in done.out
+        assert run("models", card["name"], "--json").json == card
+        assert card["licence"] in run("models", card["name"]).out
+    missing = run("models", "gpt")
+    assert missing.code == 2
+    assert "unknown model: gpt" in missing.err
+
+
+def test_doctor_finds_nothing_wrong(run):
+    done = run("doctor")
+    assert done.code == 0, done.out
+    assert "PROBLEM" not in done.out
+    assert run("doctor", "--json").json["ok"] is True
+
+
+def test_doctor_says_what_to_do(run, monkeypatch):
+    monkeypatch.setitem(sys.modules, "onnxruntime", None)
+    done = run("doctor")
+    assert done.code == 2
+    assert "PROBLEM network runtime" in done.out
+    assert "pip install" in done.out
+    assert "Traceback" not in done.out
+
+
+@pytest.mark.parametrize("command", [["train", "cae", "--out", "x"], ["export", "cae", "--run", "x"]])
+def test_without_torch_the_error_names_the_extra(run, monkeypatch, command):
+    for name in [name for name in sys.modules if name.startswith(("interpose.training", "interpose.models"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "torch", None)
+    done = run(*command)
+    assert done.code == 2
+    assert "pip install 'interpose[train]'" in done.err
+    assert len(done.err.splitlines()) == 3
+
+
+def test_networks_are_not_trained_on_test_performers(run, tmp_path):
+    pytest.importorskip("torch")
+    done = run("train", "cae", "--out", "x", "--splits", "train,test")
+    assert done.code == 2
+    assert "never on test" in done.err
+
+
+def test_data_that_is_not_there(run, tmp_path):
+    counted = run("data", "info", "--data", "nowhere", "--json").json
+    assert counted["sets"]["cmu"]["clips"] == 0
+    done = run("data", "pack", "cmu", "--data", "nowhere")
+    assert done.code == 3
+    assert len(done.err.splitlines()) == 3
+    assert run("data", "pack", "cm").code == 2
+    assert run("bench", "infilling", "--data", "nowhere").code == 3
+
+
+def test_json_is_the_only_output(run, take):
+    json.loads(run("scan", "take.bvh", "--json").out)
+    json.loads(run("data", "info", "--json").out)

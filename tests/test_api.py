@@ -1,0 +1,104 @@
+"""The public API: quick to import, and as friendly as the command line."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import interpose
+
+SOURCE = Path(interpose.__file__).parents[1]
+
+
+def test_import_costs_nothing():
+    code = (
+        f"import sys; sys.path.insert(0, {str(SOURCE)!r})\n"
+        "import interpose\n"
+        "heavy = {'torch', 'onnxruntime', 'scipy', 'numpy', 'cyclopts', 'rich'} & set(sys.modules)\n"
+        "assert not heavy, heavy\n"
+        "assert 'load' in dir(interpose)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_every_public_name_is_there():
+    for name in interpose.__all__:
+        assert getattr(interpose, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'fil'"):
+        interpose.fil  # noqa: B018
+    assert {"linear", "spline", "zero-velocity"} <= set(interpose.method_names())
+
+
+@pytest.mark.parametrize(
+    "gaps",
+    [
+        "100:120",
+        (100, 120),
+        [100, 120],
+        ["100:120"],
+        [(100, 120)],
+        interpose.Gap(100, 120),
+        [interpose.Gap(100, 120)],
+    ],
+)
+def test_gaps_in_any_form(cmu_walk, gaps):
+    done = interpose.fill(cmu_walk, gaps, method="linear")
+    (gap,) = done.report.gaps
+    assert (gap.start, gap.stop, gap.joints) == (100, 120, None)
+
+
+@pytest.mark.parametrize("joints", ["LeftArm", ["LeftArm"], ("LeftArm",)])
+def test_gaps_of_joints(cmu_walk, joints):
+    done = interpose.fill(cmu_walk, (100, 120, joints), method="linear")
+    assert done.report.gaps[0].joints == ("LeftArm",)
+    changed = (done.clip.rotation != cmu_walk.rotation).any(axis=(0, 2))
+    assert changed[cmu_walk.skeleton.index("LeftArm")]
+    assert changed.sum() == 1
+
+
+def test_clips_by_path(data, tmp_path):
+    done = interpose.fill(data / "cmu_walk.bvh", "100:120", method="spline")
+    interpose.save(done.clip, tmp_path / "out.bvh")
+    assert interpose.load(tmp_path / "out.bvh").name == "out"
+    assert interpose.recover(str(data / "cmu_walk.bvh"), "LeftArm", "100:120", method="linear").report.gaps
+
+
+def test_without_gaps_a_scan_decides(cmu_walk):
+    with pytest.raises(interpose.RequestError, match="nothing missing"):
+        interpose.fill(cmu_walk)
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[80:100], translation[80:100] = rotation[80], translation[80]
+    frozen = cmu_walk.with_motion(rotation, translation)
+    assert interpose.scan(frozen)
+    (gap,) = interpose.fill(frozen, method="spline").report.gaps
+    assert (gap.start, gap.stop) in ((80, 100), (81, 100))
+
+
+@pytest.mark.parametrize("method", ["auto", "linear"])
+def test_missing_values_marked_by_nan(cmu_walk, method):
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[100:120], translation[110:115] = np.nan, np.nan
+    clip, seen = interpose.Observation.from_nan(cmu_walk.skeleton, rotation, translation, cmu_walk.fps)
+    done = interpose.fill(clip, seen, method=method)
+    np.testing.assert_array_equal(done.clip.translation[:110], cmu_walk.translation[:110])
+    assert np.isfinite(done.clip.rotation).all()
+    assert np.abs(done.clip.positions() - cmu_walk.positions()).max() < 1.0
+    with pytest.raises(interpose.RequestError, match="Observation"):
+        interpose.fill(clip, seen, max_gap=3)
+
+
+@pytest.mark.parametrize("gap", ["120:100", "abc", (100, 500), ("a", "b"), (1,), None, {}])
+def test_gaps_that_make_no_sense(cmu_walk, gap):
+    with pytest.raises(interpose.RequestError):
+        interpose.fill(cmu_walk, [gap], method="linear")
+
+
+def test_open_gaps_are_listed(cmu_walk):
+    done = interpose.fill(cmu_walk, ["20:30", "100:160"], method="linear", max_gap=30)
+    assert done.report.open == [interpose.Gap(100, 160)]
+    np.testing.assert_array_equal(done.clip.rotation[30:], cmu_walk.rotation[30:])
