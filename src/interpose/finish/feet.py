@@ -1,7 +1,7 @@
 """Planted feet stay planted: find contacts in a gap, hold them, bend the legs accordingly.
 
-Everything is relative to the stances that are observed near the gap, so that floors need not be flat. A foot is
-its ankle and its toe; a contact of either holds that one in place on the floor.
+Everything is relative to the stances that are observed near the gap, so that floors need not be flat. A foot
+is its ankle and its toe; a contact of either holds that one in place on the floor.
 """
 
 from __future__ import annotations
@@ -11,14 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.evaluation import metrics
+from interpose.finish import measures
 from interpose.finish.windows import ramp, runs
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_mapping
 
-# A contact begins below the first speed (metres a second) and ends above the second; it is no higher above the
-# floor than HIGH and lasts at least SHORT seconds.
+# A contact is slower than the first speed (metres a second) somewhere and nowhere faster than the second; it
+# is no higher above the floor than HIGH and lasts at least SHORT seconds.
 SLOW, FAST, HIGH, SHORT = 0.30, 0.50, 0.04, 0.10
 # Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam.
 BLEND = 0.15
@@ -55,14 +55,14 @@ def ends(skeleton: Skeleton) -> list[int]:
 
 
 def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
-    """(F, n) the height at which each joint rests: that of observed stances, interpolated over what is missing.
+    """(F, n) the height at which each joint rests: of observed stances, interpolated over what is missing.
 
     positions: (F, n, 3) of ankles and toes; known: (F, n) where they are observed. On each side of a gap the
     low end of the heights of slow feet within two seconds is taken (of all heights if none is slow).
     """
     frames, count = positions.shape[:2]
     floor = np.empty((frames, count))
-    slow = metrics.speed(positions, fps) < SLOW
+    slow = measures.speed(positions, fps) < SLOW
     near = max(1, round(NEARBY * fps))
     for joint in range(count):
         heights, seen = positions[:, joint, 1], known[:, joint]
@@ -84,8 +84,8 @@ def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndar
 
 
 def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray:
-    """(F, n) True while an ankle or toe (F, n, 3) is planted: slow (with hysteresis), low, and for long enough."""
-    speeds = metrics.speed(positions, fps)
+    """(F, n) True while an ankle or toe (F, n, 3) is planted: slow (with hysteresis), low, not too short."""
+    speeds = measures.speed(positions, fps)
     low = positions[..., 1] < floor + HIGH
     possible, certain = low & (speeds < FAST), low & (speeds < SLOW)
     planted = np.zeros_like(low)
@@ -107,7 +107,7 @@ def measure(clip: Clip, known: Observation, start: int, stop: int) -> tuple[floa
     positions = clip.positions()[:, feet]
     floor = local_floor(positions, known.positions(clip.skeleton)[:, feet], clip.fps)
     part = slice(max(start - 1, 0), stop + 1)
-    return metrics.foot_slide(positions[part], clip.fps, floor[part]), metrics.foot_travel(positions[part])
+    return measures.foot_slide(positions[part], clip.fps, floor[part]), measures.foot_travel(positions[part])
 
 
 def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
@@ -118,7 +118,8 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     """
     skeleton = clip.skeleton
     start, stop = span
-    free = [~known.rotation[:, [leg.thigh, leg.knee, leg.ankle]].any(axis=1) for leg in legs(skeleton)]
+    joints = [[leg.thigh, leg.knee, leg.ankle] for leg in legs(skeleton)]
+    free = [(~known.rotation[:, chain]).all(axis=1) for chain in joints]
     if not any(f[start:stop].any() for f in free):
         return clip
     rotation = clip.rotation.copy()
@@ -147,9 +148,9 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
 def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float) -> np.ndarray:
     """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
 
-    feet: (F, 2, 3); planted: (F, 2). A contact that goes on in observed frames is held where it is at the seam
-    (between the two places, when it does so at both ends), any other one at its mean. Outside of a contact the
-    shift fades; where only one of the two is held, the other moves with it.
+    feet: (F, 2, 3); planted: (F, 2). A contact that goes on in observed frames is held where it is at the
+    seam (between the two places, when it does so at both ends), any other one at its mean. Outside of a
+    contact the shift fades; where only one of the two is held, the other moves with it.
     """
     frames = len(feet)
     blend = max(2, round(BLEND * fps))
@@ -200,13 +201,18 @@ def _envelope(movable: np.ndarray, fps: float) -> np.ndarray:
 
 
 def _reach(
-    skeleton: Skeleton, leg: Leg, rotation: np.ndarray, turned: np.ndarray, placed: np.ndarray, goal: np.ndarray
+    skeleton: Skeleton,
+    leg: Leg,
+    rotation: np.ndarray,
+    turned: np.ndarray,
+    placed: np.ndarray,
+    goal: np.ndarray,
 ) -> np.ndarray:
-    """Local rotations (F, J, 4) with which ankle and toe reach `goal` (F, 2, 3) as far as the leg is long.
+    """Local rotations (F, J, 4) by which ankle and toe reach `goal` (F, 2, 3) as far as the leg is long.
 
-    Two bones: the knee bends or straightens in its own plane until hip and ankle are as far apart as they should
-    be, the thigh turns the ankle there by the shortest way, and the foot keeps its direction or turns its toe to
-    its goal.
+    Two bones: the knee bends or straightens in its own plane until hip and ankle are as far apart as they
+    should be, the thigh turns the ankle there by the shortest way, and the foot keeps its direction or turns
+    its toe to its goal.
     """
     hip, knee, ankle, toe = (placed[:, j] for j in (leg.thigh, leg.knee, leg.ankle, leg.toe))
     thigh, shin = knee - hip, ankle - knee

@@ -11,6 +11,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.methods.protocol import Raw
+from interpose.observation import Gap
 
 
 class Provenance(IntEnum):
@@ -32,14 +33,15 @@ class GapReport:
         method: the method that filled it, by name: the fallback's when it fell back.
         model: the trained model, if the method has one.
         solve_error: cm, mean distance of the solved pose from the positions that the method gave.
-        seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of what
-            the method said and of what is returned.
+        seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of
+            what the method said and of what is returned.
         seam_limit: cm a frame squared, the 95th percentile of the clip's own velocity jumps.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.
         drift: cm, of the root trajectory before it was spread over the gap.
         notes: one sentence each: what fell back and why, what stays above a limit.
+        number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
     """
 
     start: int
@@ -57,6 +59,7 @@ class GapReport:
     foot_travel: float | None = None
     drift: float | None = None
     notes: tuple[str, ...] = ()
+    number: int = 0
 
     def __str__(self) -> str:
         where = f"{self.start}:{self.stop}"
@@ -78,17 +81,20 @@ class GapReport:
 
 @dataclass(frozen=True)
 class Report:
-    """All gaps of a clip, in order of time."""
+    """The filled gaps of a clip in order of time, and those left open."""
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
+    open: list[Gap] = field(default_factory=list)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
-        return {"method": self.method, "gaps": [_plain(asdict(gap)) for gap in self.gaps]}
+        gaps, left = ([_plain(asdict(gap)) for gap in some] for some in (self.gaps, self.open))
+        return {"method": self.method, "gaps": gaps, "open": left}
 
     def __str__(self) -> str:
-        return "\n".join(map(str, self.gaps)) or "nothing is missing"
+        lines = [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
+        return "\n".join(lines) or "nothing is missing"
 
 
 @dataclass(frozen=True, eq=False)

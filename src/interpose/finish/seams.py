@@ -1,8 +1,8 @@
 """No pop: fade what a method says differently from what is observed, and measure what is left.
 
-A *run* is a range of frames in which one value is missing, a *span* one in which any is. What borders on a run
-is a *seam*. Everything is done in local rotations (from the right) and along the clip's axes in translations,
-so that a clip that is turned or shifted gives the same, turned or shifted.
+A *run* is a range of frames in which one value is missing, a *span* one in which any is. The observed frame
+beside a run is a *seam*. Everything is done in local rotations (from the right) and in translations as
+vectors, so that a clip that is turned or shifted gives the same, turned or shifted.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.evaluation import metrics
+from interpose.finish import measures
 from interpose.finish.solve import refine
 from interpose.finish.windows import runs
 from interpose.geometry import rotations
@@ -24,7 +24,7 @@ from interpose.observation import Observation
 VALUE_FADE, SLOPE_FADE = 0.75, 0.25
 # Seconds of observed motion from which the difference in velocity is taken: less is noise.
 MOMENT = 0.05
-# A method that differs by more than this at a seam (metres) has lost the motion, and is not faded but replaced.
+# A method that differs by more than this at a seam (metres) has lost the motion: replaced, not faded.
 ABSURD = 0.5
 # Below this a difference in a local rotation (radians) or translation (metres) is none.
 EXACT = 1e-6
@@ -42,7 +42,7 @@ def reach(fps: float) -> int:
 
 
 def edges(known: Observation, translated: tuple[int, ...], span: tuple[int, int]) -> np.ndarray:
-    """The frames of a span's seams: the observed one at each end of every run, where it has both neighbours."""
+    """The frames of a span's seams: the observed one at each end of every run, if it has both neighbours."""
     found: set[int] = set()
     for seen in (known.rotation, known.translation[:, list(translated)]):
         for start, stop in _shared(seen, span):
@@ -62,11 +62,18 @@ def limit(clip: Clip, observation: Observation) -> float | None:
         known = observation.slice(start, stop).positions(clip.skeleton)
         known = known[:-2] & known[1:-1] & known[2:]
         if known.any():
-            part = metrics.acceleration(clip.slice(start, stop).positions())
+            part = measures.acceleration(_bare(clip, observation, start, stop).positions())
             pooled.append(part[known].astype(np.float32))
     if not pooled:
         return None
     return max(float(np.percentile(np.concatenate(pooled), PERCENTILE)), FLOOR / clip.fps**2)
+
+
+def _bare(clip: Clip, observation: Observation, start: int, stop: int) -> Clip:
+    """Some frames, in which nothing unobserved is looked at."""
+    seen = observation.translation[start:stop, list(clip.translated), None]
+    rotation = np.where(observation.rotation[start:stop, :, None], clip.rotation[start:stop], [1.0, 0, 0, 0])
+    return clip.with_motion(rotation, np.where(seen, clip.translation[start:stop], 0.0))
 
 
 @dataclass(frozen=True)
@@ -97,7 +104,7 @@ def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Cl
     """Ease the raw motion of the span into the observed one on both sides, value by value.
 
     Args:
-        raw: (F) frames; at observed frames what the method says of them, at least `reach` frames on each side.
+        raw: (F) frames; at observed frames what the method says of them, `reach` frames on each side.
         base: (F) frames, the observed motion.
         known: what is observed.
         span: the frames in which anything may be changed.
@@ -120,9 +127,9 @@ def jumps(motion: Clip, known: Observation, edge: int) -> np.ndarray:
 
     Zero for joints whose positions are observed around it: what they do is no seam.
     """
-    near = slice(edge - 1, edge + 2)
     jump = np.diff(motion.slice(edge - 1, edge + 2).positions(), 2, axis=0)[0]
-    return np.where(known.slice(near.start, near.stop).positions(motion.skeleton).all(axis=0)[:, None], 0.0, jump)
+    seen = np.asarray(known.slice(edge - 1, edge + 2).positions(motion.skeleton)).all(axis=0, keepdims=True)
+    return np.where(seen.T, 0.0, jump)
 
 
 def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
@@ -138,6 +145,8 @@ def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float
         excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
         if not excess.any():
             continue
+        # Joints far below the limit may give way for those above it.
+        weights = np.where(size[:, 0] > 0.7 * limit, 1.0, 0.05)
         for way in (1, -1):
             at = slice(edge + way, edge + way + 1)
             # What is missing on both sides of a lone key shares the work.
@@ -148,7 +157,8 @@ def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float
             if fresh.complete:
                 continue
             one = motion.slice(at.start, at.stop)
-            nudges[edge, way] = refine(one, fresh, tuple(range(len(motion.skeleton))), one.positions() - part * excess)
+            goal, everything = one.positions() - part * excess, tuple(range(len(motion.skeleton)))
+            nudges[edge, way] = refine(one, fresh, everything, goal, weights)
     if not nudges:
         return motion
 
@@ -207,7 +217,7 @@ def _shared(known: np.ndarray, span: tuple[int, int]) -> dict[tuple[int, int], l
 
 
 def offset(raw: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """How the observed values differ from the raw ones: (..., 3) from quaternions (..., 4) or vectors (..., 3)."""
+    """How observed values differ from raw ones: (..., 3) from quaternions (..., 4) or vectors (..., 3)."""
     if raw.shape[-1] == 3:
         return base - raw
     return rotations.log(rotations.multiply(rotations.conjugate(raw), base))

@@ -21,9 +21,9 @@ NO_LENGTH = 0.01
 # How strongly a fit is pulled towards the pose it starts from, and how strongly bones count that reach over a
 # joint without length: only what the bones at the joint itself leave open should follow either.
 PULL, FAR = 1e-4, 1e-3
-# Sine of the bend below which a knee or elbow tells nothing about the twist above it, and from which it tells all.
+# Sine of the bend below which a knee or elbow tells nothing of the twist above it, and from which it tells all.
 STRAIGHT, BENT = 0.1, 0.35
-# Gauss-Newton: steps, frames at once, and the damping in square metres (a bone's length squared is about 0.1).
+# Gauss-Newton: steps, frames at once, and damping in square metres (a bone's length squared is about 0.1).
 STEPS, BLOCK, DAMPING = 3, 512, 2e-3
 
 
@@ -51,11 +51,14 @@ def solve(clip: Clip, observation: Observation, joints: tuple[int, ...], positio
     if not parts:
         return clip
     return clip.with_motion(
-        np.concatenate([part.rotation for part in parts]), np.concatenate([part.translation for part in parts])
+        np.concatenate([part.rotation for part in parts]),
+        np.concatenate([part.translation for part in parts]),
     )
 
 
-def _carriers(skeleton: Skeleton, translated: tuple[int, ...], known: Collection[int]) -> dict[int, list[int]]:
+def _carriers(
+    skeleton: Skeleton, translated: tuple[int, ...], known: Collection[int]
+) -> dict[int, list[int]]:
     """Which animated translation carries which topmost known joints: {translated joint: [known joints]}."""
     carried: dict[int, list[int]] = {}
     for joint in sorted(known):
@@ -154,7 +157,7 @@ def _aim(clip: Clip, observation: Observation, target: dict[int, np.ndarray]) ->
         else:
             turn = _fit(np.stack(reach, 1), np.stack(wanted, 1), np.array([w for _, w in aims[joint]]))
         if joint in limbs and aims[joint][0][0] == limbs[joint][0]:
-            knee, ankle = limbs[joint]
+            ankle = limbs[joint][1]
             aimed = rotations.multiply(turn, turned[:, joint])
             at_knee = placed[:, joint] + rotations.rotate(turn, reach[0])
             shin = rotations.rotate(aimed, down(joint, ankle)) - (at_knee - placed[:, joint])
@@ -202,12 +205,20 @@ def _twist(axis: np.ndarray, bone: np.ndarray, wanted: np.ndarray) -> np.ndarray
     return rotations.exp((share * angle)[:, None] * axis)
 
 
-def refine(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
-    """A few damped Gauss-Newton steps on all joint angles at once.
+def refine(
+    clip: Clip,
+    observation: Observation,
+    joints: tuple[int, ...],
+    positions: np.ndarray,
+    weights: np.ndarray | None = None,
+) -> Clip:
+    """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
-    this shares it out. Damping keeps what positions do not tell.
+    this shares it out. Damping keeps what positions do not tell. `weights` (n,) says how much each position
+    counts; default: all the same.
     """
+    heavy = np.repeat(np.ones(len(joints)) if weights is None else weights, 3)
     skeleton = clip.skeleton
     movable = [j for j in sorted(joints) if any(j in skeleton.ancestors(k) for k in joints)]
     carriers = list(_carriers(skeleton, clip.translated, set(joints)))
@@ -231,6 +242,7 @@ def refine(clip: Clip, observation: Observation, joints: tuple[int, ...], positi
         jacobian *= free[:, None, :]
         miss = (positions - placed[:, joints]).reshape(len(clip), -1)
         transposed = np.swapaxes(jacobian, 1, 2)
+        transposed = transposed * heavy
         normal = transposed @ jacobian + DAMPING * np.eye(jacobian.shape[2])
         step = np.linalg.solve(normal, transposed @ miss[..., None])[..., 0] * free
         turn, shift = step[:, : 3 * len(movable)], step[:, 3 * len(movable) :]

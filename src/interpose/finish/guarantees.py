@@ -12,8 +12,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.evaluation import metrics
-from interpose.finish import feet, seams
+from interpose.finish import feet, measures, seams
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow, runs
@@ -26,19 +25,23 @@ from interpose.observation import Gap, Observation
 NOWHERE = 1e4
 # Frames solved at once.
 CHUNK = 4096
-# Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second) beyond
-# which they are not: that is a jump in value.
+# Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
+# beyond which they are not: that is a jump in value.
 ROUNDS, KINK = 6, 8.0
 
 
 @dataclass
 class _Span:
-    """A range of frames in which something is missing, and what becomes of it."""
+    """A range of frames in which something is missing, and what becomes of it.
+
+    `problem` says why the method's own motion does not do; it is `hopeless` if it should not be used at all.
+    """
 
     start: int
     stop: int
     method: str
     problem: str | None = None
+    hopeless: bool = False
     notes: list[str] = field(default_factory=list)
 
     def around(self, frames: int, margin: int) -> tuple[int, int, tuple[int, int]]:
@@ -48,13 +51,18 @@ class _Span:
 
 
 def complete(
-    clip: Clip, observation: Observation, method: Method, seed: int | None = None, fallback: Method | None = None
+    clip: Clip,
+    observation: Observation,
+    method: Method,
+    seed: int | None = None,
+    fallback: Method | None = None,
+    limit: float | None = None,
 ) -> Completion:
     """Complete a clip by a method, and make the result usable.
 
-    Observed values come back bit for bit, bones keep their lengths, there is no pop at seams, planted feet stay
-    planted, and what is unobserved in `clip` has no influence on anything. Gaps that the method refuses, or at
-    whose seams it fails, are filled by `fallback` (default: the spline), which the report names.
+    Observed values come back bit for bit, bones keep their lengths, there is no pop at seams, planted feet
+    stay planted, and what is unobserved in `clip` has no influence on anything. Gaps that the method refuses,
+    or at whose seams it fails, are filled by `fallback` (default: the spline), which the report names.
 
     Args:
         clip: F frames; its unobserved values may be anything.
@@ -62,6 +70,8 @@ def complete(
         method: what completes it.
         seed: for methods that sample.
         fallback: the simpler method.
+        limit: metres per frame squared, the largest velocity jump allowed at a seam, when `clip` is a window
+            of a longer one. Default: the 95th percentile of the clip's own.
 
     Raises:
         RequestError: the observation does not fit the clip, or nothing fills a gap.
@@ -90,7 +100,7 @@ def complete(
 
     opinion, error = _opinion(raw, known, spans)
     current = _merge(opinion, hidden, known)
-    limit = seams.limit(hidden, known)
+    limit = seams.limit(hidden, known) if limit is None else limit
     before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
     unheld: dict[Gap, tuple[float, float] | None] = {}
 
@@ -107,18 +117,25 @@ def complete(
 
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
+        span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
         span.problem = span.problem or _pop(current, known, span, limit)
     failed = [span for span in spans if span.problem and fallback.name != method.name]
     if failed:
         second = _second(fallback, hidden, observation, gaps, seed).clip
-        merged = _merge(second, hidden, known)
+        merged, own = _merge(second, hidden, known), _merge(current, hidden, known)
         for span in failed:
             _write(current, merged, span.start, (span.start, span.stop))
+        settle(failed, second)
+        for span in failed:
+            # Where the simpler method is no better at the seams, there is no reason to lose the motion.
+            jump, theirs = _seams(own, known, span) or 0.0, _seams(current, known, span) or 0.0
+            if not span.hopeless and theirs > max(limit or 0.0, jump):
+                _write(current, own, span.start, (span.start, span.stop))
+                continue
             span.method = fallback.name
             span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
-        settle(failed, second)
     for span in spans:
         if above := _pop(current, known, span, limit):
             span.notes.append(f"flagged: {above}")
@@ -130,7 +147,19 @@ def complete(
     )
     _verify(finished, clip, known)
     reports = [
-        _report(finished, known, gap, _of(spans, gap), raw, error, before[gap], limit, unheld.get(gap)) for gap in gaps
+        _report(
+            finished,
+            known,
+            gap,
+            _of(spans, gap),
+            raw,
+            error,
+            before[gap],
+            limit,
+            unheld.get(gap),
+            method.name,
+        )
+        for gap in gaps
     ]
     provenance = _provenance(known, spans, method.name, opinion, finished)
     return Completion(finished, raw, provenance, Report(method.name, reports))
@@ -150,7 +179,7 @@ def wipe(clip: Clip, observation: Observation) -> Clip:
 
 
 def _trusted(clip: Clip, observation: Observation) -> Observation:
-    """What must come back unchanged: observed with full trust. Translations that are not animated always are."""
+    """What must come back unchanged: observed with full trust, and translations that are not animated."""
     trusted = observation.trust >= 1
     translation = observation.translation & trusted
     still = [j for j in range(len(clip.skeleton)) if j not in clip.translated]
@@ -162,7 +191,9 @@ def _of(spans: list[_Span], gap: Gap) -> _Span:
     return next(span for span in spans if span.start <= gap.start and gap.stop <= span.stop)
 
 
-def _second(fallback: Method, hidden: Clip, observation: Observation, gaps: list[Gap], seed: int | None) -> Raw:
+def _second(
+    fallback: Method, hidden: Clip, observation: Observation, gaps: list[Gap], seed: int | None
+) -> Raw:
     """The fallback's completion; raises RequestError when it refuses, too."""
     for gap in gaps:
         if reason := fallback.refuses(hidden, gap):
@@ -241,7 +272,9 @@ def _pop(current: Clip, known: Observation, span: _Span, limit: float | None) ->
     jump = _seams(current, known, span)
     if limit is None or jump is None or jump <= limit:
         return None
-    return f"the velocity jumps by {100 * jump:.2f} cm/frame^2 at a seam, above the limit of {100 * limit:.2f}"
+    return (
+        f"the velocity jumps by {100 * jump:.2f} cm/frame^2 at a seam, above the limit of {100 * limit:.2f}"
+    )
 
 
 def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _Span) -> None:
@@ -312,9 +345,10 @@ def _report(
     before: float | None,
     limit: float | None,
     unheld: tuple[float, float] | None,
+    method: str,
 ) -> GapReport:
     part = finished.slice(gap.start, gap.stop)
-    own = span.problem is None
+    own = span.method == method
     skeleton = finished.skeleton
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
@@ -331,7 +365,7 @@ def _report(
         seam_before=_centi(before),
         seam_after=_centi(after),
         seam_limit=_centi(limit),
-        bone_deviation=100 * metrics.bone_deviation(part.positions(), skeleton.parents, lengths),
+        bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
         foot_slide=feet_now[0] if feet_now else None,
         foot_slide_before=unheld[0] if unheld else None,
         foot_travel=feet_now[1] if feet_now else None,

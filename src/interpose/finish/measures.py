@@ -1,0 +1,86 @@
+"""Measures of a motion, as functions of positions in metres; each docstring says what comes out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Height above the floor, in metres, at which a moving foot no longer counts as sliding (Zhang et al. 2018).
+SLIDE_HEIGHT = 0.025
+
+
+def joint_error(positions: np.ndarray, truth: np.ndarray) -> float:
+    """Mean distance in metres between two motions (..., 3); NaN when they are empty."""
+    if positions.size == 0:
+        return float("nan")
+    return float(np.linalg.norm(positions - truth, axis=-1).mean())
+
+
+def acceleration(positions: np.ndarray) -> np.ndarray:
+    """Velocity jumps (F - 2, ...) of positions (F, ..., 3): the length of their second difference.
+
+    In metres per frame squared; row i belongs to frame i + 1.
+    """
+    return np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1)
+
+
+def seam_jump(positions: np.ndarray, frames: np.ndarray) -> float:
+    """The largest velocity jump of any joint at `frames`, in metres per frame squared.
+
+    positions: (F, J, 3). Frames without a neighbour on both sides have none; NaN when that leaves no frame.
+    """
+    frames = np.asarray(frames, int)
+    frames = frames[(frames > 0) & (frames < len(positions) - 1)]
+    if frames.size == 0:
+        return float("nan")
+    return float(acceleration(positions)[frames - 1].max())
+
+
+def bone_deviation(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> float:
+    """Largest difference in metres between a bone's length in any frame and what it should be.
+
+    positions: (F, J, 3); parents: -1 for joints without a bone; lengths: (J,), NaN for bones without a fixed
+    length (animated translations).
+    """
+    fixed = [j for j, parent in enumerate(parents) if parent >= 0 and np.isfinite(lengths[j])]
+    if not fixed or len(positions) == 0:
+        return 0.0
+    bones = positions[:, fixed] - positions[:, [parents[j] for j in fixed]]
+    return float(np.abs(np.linalg.norm(bones, axis=-1) - lengths[fixed]).max())
+
+
+def speed(positions: np.ndarray, fps: float) -> np.ndarray:
+    """Horizontal speed (F, ...) in metres a second of positions (F, ..., 3), by central differences."""
+    if len(positions) < 2:
+        return np.zeros(positions.shape[:-1])
+    velocity = np.gradient(positions, axis=0) * fps
+    return np.linalg.norm(velocity[..., [0, 2]], axis=-1)
+
+
+def foot_slide(positions: np.ndarray, fps: float, floor: np.ndarray | None = None) -> float:
+    """How much planted feet slide, in centimetres a second: the mean of v * clip(2 - 2 ** (h / H), 0, 1).
+
+    Source: Zhang et al., Mode-Adaptive Neural Networks for Quadruped Motion Control, 2018; H is 2.5 cm. v is
+    the horizontal speed between neighbouring frames, h the height above `floor`.
+
+    Args:
+        positions: (F, n, 3) ankles and/or toes.
+        floor: heights at which each of them rests, broadcast to (F, n): floors need not be flat, and an ankle
+            rests higher than a toe. Default: the lowest height of each over the clip.
+    """
+    if len(positions) < 2:
+        return 0.0
+    floor = positions[..., 1].min(axis=0) if floor is None else floor
+    height = positions[..., 1] - np.broadcast_to(floor, positions.shape[:-1])
+    height = np.maximum(0.5 * (height[1:] + height[:-1]), 0.0)
+    step = np.linalg.norm(np.diff(positions[..., [0, 2]], axis=0), axis=-1)
+    return float((100.0 * fps * step * np.clip(2.0 - 2.0 ** (height / SLIDE_HEIGHT), 0.0, 1.0)).mean())
+
+
+def foot_travel(positions: np.ndarray) -> float:
+    """Length of the feet's paths in metres, mean over the n joints of positions (F, n, 3).
+
+    The counterpart of `foot_slide`: feet that are frozen do not slide, but do not travel either.
+    """
+    if len(positions) < 2:
+        return 0.0
+    return float(np.linalg.norm(np.diff(positions, axis=0), axis=-1).sum(axis=0).mean())

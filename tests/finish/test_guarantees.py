@@ -1,0 +1,260 @@
+"""The guarantees of DESIGN: each test would fail if its guarantee were broken, for every method."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.finish import Provenance, complete, measures, seams
+from interpose.geometry import rotations
+from interpose.methods.classical import Linear, Spline, ZeroVelocity
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+
+from .conftest import Speaking, gaps_of
+
+ARM = ("LeftArm", "LeftForeArm", "LeftHand")
+
+
+def observations(clip: Clip) -> dict[str, Observation]:
+    frames = len(clip)
+    root = Observation.full(clip)
+    root.translation[50:70, 0] = False
+    keys = Observation.full(clip)
+    keys.rotation[np.arange(frames) % 9 > 0] = False
+    keys.translation[np.arange(frames) % 9 > 0, 0] = False
+    rng = np.random.default_rng(3)
+    drops = Observation.full(clip)
+    drops.rotation[rng.random(drops.rotation.shape) < 0.1] = False
+    return {
+        "middle": gaps_of(clip, (45, 75)),
+        "one frame": gaps_of(clip, (60, 61)),
+        "two frames": gaps_of(clip, (60, 62)),
+        "start": gaps_of(clip, (0, 20)),
+        "end": gaps_of(clip, (100, frames)),
+        "two with one frame between": gaps_of(clip, (40, 60), (61, 80)),
+        "touching": Observation.from_gaps(clip, [Gap(40, 60), Gap(60, 80, ARM), Gap(70, 90, ("LeftUpLeg",))]),
+        "arm": Observation.from_gaps(clip, [Gap(30, 90, ARM)]),
+        "arm, all the time": Observation.from_gaps(clip, [Gap(0, frames, ARM)]),
+        "root": root,
+        "keys": keys,
+        "drop-outs": drops,
+        "nothing observed": gaps_of(clip, (0, frames)),
+    }
+
+
+CASES = list(observations(Clip(Skeleton(("a", *ARM, "LeftUpLeg"), (-1, 0, 0, 0, 0), np.zeros((5, 3))),
+                               np.tile([1.0, 0, 0, 0], (120, 5, 1)), np.zeros((120, 1, 3)), 30.0)))  # fmt: skip
+
+
+@pytest.fixture(params=CASES)
+def known(request, walk) -> Observation:
+    return observations(walk)[request.param]
+
+
+def bytes_of(clip: Clip) -> bytes:
+    return clip.rotation.tobytes() + clip.translation.tobytes()
+
+
+def test_observed_values_and_bones_are_the_same(walk, make, known):
+    done = complete(walk, known, make(walk))
+    assert done.clip.rotation[known.rotation].tobytes() == walk.rotation[known.rotation].tobytes()
+    seen = known.translation[:, list(walk.translated)]
+    assert done.clip.translation[seen].tobytes() == walk.translation[seen].tobytes()
+    lengths = np.linalg.norm(walk.skeleton.rest_translation, axis=1)
+    assert measures.bone_deviation(done.clip.positions(), walk.skeleton.parents, lengths) < 1e-9
+    assert np.allclose(np.linalg.norm(done.clip.rotation, axis=-1), 1, atol=1e-9)
+    missing = ~(known.rotation & known.translation)
+    assert ((done.provenance != Provenance.OBSERVED) == missing).all()
+
+
+def test_nothing_leaks(walk, make, known):
+    """Other values, huge ones and no numbers at all in unobserved places change no bit of the output."""
+    method = make(walk)
+    reference = complete(walk, known, method)
+    gone, moved = ~known.rotation, ~known.translation[:, list(walk.translated)]
+    for poison in (np.nan, 1e300, -3.0):
+        poisoned = replace(walk, rotation=walk.rotation.copy(), translation=walk.translation.copy(), source="old")
+        poisoned.rotation[gone] = poison
+        poisoned.translation[moved] = poison
+        done = complete(poisoned, known, method)
+        assert bytes_of(done.clip) == bytes_of(reference.clip)
+        assert done.report.to_dict() == reference.report.to_dict()
+        assert (done.provenance == reference.provenance).all()
+
+
+@pytest.mark.parametrize("start", range(15, 90, 12))
+def test_no_pop_at_seams(walk, make, start):
+    known = gaps_of(walk, (start, start + 24))
+    done = complete(walk, known, make(walk))
+    [report] = done.report.gaps
+    limit = seams.limit(walk, known)
+    jump = measures.seam_jump(done.clip.positions(), [start - 1, start + 24])
+    assert report.seam_after == pytest.approx(100 * jump)
+    assert report.seam_limit == pytest.approx(100 * limit)
+    assert jump <= limit
+    assert not report.notes or report.method == "spline"
+
+
+def test_limit_is_the_percentile_of_observed_motion_only(walk):
+    known = gaps_of(walk, (40, 80))
+    jumps = measures.acceleration(walk.positions())
+    pooled = np.concatenate([jumps[:38], jumps[80:]])
+    assert seams.limit(walk, known) == pytest.approx(np.percentile(pooled, 95), rel=1e-5)
+    assert seams.limit(walk, gaps_of(walk, (0, 120))) is None
+
+
+def test_spline_that_fits_stays_what_it_is(walk):
+    """What already meets the guarantees is not touched, but for the feet."""
+    known = Observation.from_gaps(walk, [Gap(40, 60, ARM)])
+    done = complete(walk, known, Spline())
+    assert done.report.gaps[0].notes == ()
+    assert np.allclose(done.clip.rotation, done.raw.clip.rotation, atol=1e-12)
+
+
+def test_a_network_is_met_in_value_and_velocity(walk):
+    """3 cm to the side: unfinished it would jump by 3 cm; in the middle of the gap it keeps its opinion."""
+    method = Speaking(walk, sigma=0.0, bias=0.03)
+    known = gaps_of(walk, (30, 90))
+    done = complete(walk, known, method)
+    [report] = done.report.gaps
+    assert report.method == "speaking" and report.model == "made up" and report.drift == pytest.approx(12.0)
+    assert report.seam_before > 2.5 and report.seam_after <= report.seam_limit
+    assert report.solve_error < 0.1
+    off = np.linalg.norm(done.clip.root - walk.root, axis=-1)
+    assert off[30] < 0.003 and off[89] < 0.003 and off[60] > 0.025
+
+
+def test_a_lost_method_falls_back_by_name(walk):
+    known = gaps_of(walk, (20, 30), (60, 90))
+    method = Speaking(walk, sigma=0.0)
+    method.positions[55:] += [0.0, 0.0, 2.0]
+    first, second = complete(walk, known, method).report.gaps
+    assert (first.method, second.method) == ("speaking", "spline")
+    assert second.model is None and "filled by spline" in second.notes[0] and "cm away" in second.notes[0]
+    clip = complete(walk, gaps_of(walk, (60, 90)), method).clip
+    assert np.linalg.norm(clip.root - walk.root, axis=-1).max() < 0.5
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e200])
+def test_positions_that_are_no_numbers_fall_back(walk, value):
+    method = Speaking(walk, sigma=0.0)
+    method.positions[70, 3] = value
+    done = complete(walk, gaps_of(walk, (20, 30), (60, 90)), method)
+    first, second = done.report.gaps
+    assert (first.method, second.method) == ("speaking", "spline")
+    assert (done.provenance[60:90] == Provenance.FALLBACK).all()
+
+
+def test_a_jump_in_value_is_no_fill(walk):
+    """Holding the last pose while the body walks on cannot be eased: it is replaced, and the report says so."""
+    [report] = complete(walk, gaps_of(walk, (40, 80)), ZeroVelocity()).report.gaps
+    assert report.method == "spline" and report.seam_before > 10 and "filled by spline" in report.notes[0]
+
+
+class Refusing(Linear):
+    name = "refusing"
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        return "it is too long" if len(gap) > 15 else None
+
+
+def test_refused_gaps_are_filled_by_the_fallback(walk):
+    known = gaps_of(walk, (20, 30), (60, 90))
+    first, second = complete(walk, known, Refusing()).report.gaps
+    assert (first.method, second.method) == ("refusing", "spline")
+    assert "too long" in second.notes[0]
+    with pytest.raises(RequestError, match="too long"):
+        complete(walk, known, Refusing(), fallback=Refusing())
+
+
+def test_an_observation_of_another_clip_is_refused(walk):
+    with pytest.raises(RequestError, match="does not fit"):
+        complete(walk, gaps_of(walk.slice(0, 60), (10, 20)), Linear())
+
+
+@pytest.mark.parametrize("case", ["middle", "arm", "keys", "start", "touching"])
+def test_a_turned_and_shifted_clip_gives_the_same_result(walk, make, case):
+    known = observations(walk)[case]
+    turn, shift = rotations.about("Y", np.array(1.1)), np.array([3.0, 0.0, -7.0])
+    rotation = walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    moved = walk.with_motion(rotation, rotations.rotate(turn, walk.translation) + shift)
+    here, there = make(walk), make(moved)
+    if isinstance(here, Speaking):
+        there.positions = rotations.rotate(turn, here.positions) + shift
+    here, there = complete(walk, known, here), complete(moved, known, there)
+    expected = rotations.rotate(turn, here.clip.positions()) + shift
+    assert np.allclose(there.clip.positions(), expected, atol=1e-6)
+
+
+def test_same_input_same_bytes(walk, make):
+    known = gaps_of(walk, (20, 30), (45, 75))
+    once, again = (complete(walk, known, make(walk), seed=1) for _ in range(2))
+    assert bytes_of(once.clip) == bytes_of(again.clip)
+    assert json.dumps(once.report.to_dict()) == json.dumps(again.report.to_dict())
+
+
+@pytest.mark.parametrize("frames", [1, 2])
+@pytest.mark.parametrize("gap", [(0, 1), (1, 2), (0, 2)])
+def test_clips_of_one_and_two_frames(walk, make, frames, gap):
+    short = walk.slice(0, frames)
+    if gap[1] > frames:
+        pytest.skip("no such frame")
+    known = gaps_of(short, gap)
+    done = complete(short, known, make(short))
+    assert len(done.clip) == frames
+    assert done.clip.rotation[known.rotation].tobytes() == short.rotation[known.rotation].tobytes()
+
+
+def test_nothing_missing_is_no_work(walk, make):
+    done = complete(walk, Observation.full(walk), make(walk))
+    assert done.clip is walk and done.report.gaps == [] and not done.provenance.any()
+    assert str(done.report) == "nothing is missing"
+
+
+def test_values_with_little_trust_may_change(walk):
+    known = Observation.full(walk)
+    known.trust[40:60] = 0.5
+    done = complete(walk, known, Speaking(walk))
+    assert (done.provenance[40:60] == Provenance.OBSERVED).sum() == 0
+    assert done.clip.rotation[:40].tobytes() == walk.rotation[:40].tobytes()
+    assert not np.array_equal(done.clip.rotation[40:60], walk.rotation[40:60])
+
+
+def test_motion_that_is_observed_is_no_seam(walk):
+    """A missing wrist while the observed legs step hard must not be blamed for their jump."""
+    feet = [walk.skeleton.index(n) for n in ("LeftUpLeg", "RightUpLeg")]
+    shaken = walk.with_motion(walk.rotation.copy(), walk.translation)
+    shaken.rotation[49:52, feet] = rotations.multiply(shaken.rotation[49:52, feet], rotations.exp(np.array([0.5, 0, 0])))
+    known = Observation.from_gaps(shaken, [Gap(50, 60, ("LeftHand",))])
+    [report] = complete(shaken, known, Linear()).report.gaps
+    assert report.method == "linear" and report.notes == ()
+
+
+def test_a_method_sees_no_unobserved_value_and_no_file(walk):
+    class Spy(Linear):
+        def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+            self.seen = clip
+            return super().complete(clip, observation, seed)
+
+    spy, known = Spy(), gaps_of(walk, (45, 75))
+    complete(replace(walk, source="the text of the file"), known, spy)
+    assert spy.seen.source is None
+    assert np.abs(spy.seen.root[45:75] - walk.root[45:75]).max() > 1e-3
+    assert np.array_equal(spy.seen.root[75:], walk.root[75:])
+
+
+def test_report_is_plain_and_readable(walk):
+    done = complete(walk, gaps_of(walk, (45, 75)), Speaking(walk))
+    [report] = done.report.gaps
+    plain = json.loads(json.dumps(done.report.to_dict()))
+    assert plain["gaps"][0]["start"] == 45 and plain["gaps"][0]["method"] == "speaking"
+    assert plain["gaps"][0]["joints"] is None
+    text = str(done.report)
+    assert "gap 45:75" in text and "speaking (made up)" in text and f"{report.foot_slide:.1f} cm/s" in text
