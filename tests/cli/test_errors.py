@@ -207,11 +207,18 @@ def test_a_broken_pipe_is_quiet(take):
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
 def test_control_c_in_a_process(tmp_path):
     """Interrupted while it waits for its input."""
-    os.mkfifo(tmp_path / "gaps.json")
-    (tmp_path / "take.bvh").write_text("")
+    pipe = tmp_path / "gaps.json"
+    os.mkfifo(pipe)
     process = start("fill", "take.bvh", "--gaps", "gaps.json", cwd=tmp_path)
-    time.sleep(1.5)
+    writer = None
+    while writer is None and process.poll() is None:
+        try:
+            writer = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
+        except OSError:  # nobody reads yet
+            time.sleep(0.02)
     process.send_signal(signal.SIGINT)
-    out, err = process.communicate(timeout=20)
+    out, err = process.communicate(timeout=60)
+    if writer is not None:
+        os.close(writer)
     assert process.returncode == 130
     assert (out, err) == ("", "")

@@ -11,45 +11,54 @@ from pathlib import Path
 import pytest
 
 import interpose
+import interpose.cli
 from interpose.formats import load
 
 SOURCE = Path(interpose.__file__).parents[1]
 
 
-def test_help_imports_nothing_heavy(tmp_path):
-    """What makes `interpose --help` start quickly: neither NumPy nor what stands on it is imported."""
+VERBS = [verb for verbs in interpose.cli.VERBS.values() for verb in verbs]
+HEAVY = "{'torch', 'onnxruntime', 'scipy', 'numpy', 'matplotlib', 'cyclopts', 'rich'}"
+
+
+def imported_by(tokens: list[str], cwd: Path) -> tuple[str, set[str]]:
+    """What a call prints, and which of HEAVY it imports, in a process of its own."""
     code = (
         f"import sys; sys.path.insert(0, {str(SOURCE)!r})\n"
         "from interpose.cli import main\n"
-        "code = main(['--help'])\n"
-        "heavy = {'torch', 'onnxruntime', 'scipy', 'numpy', 'rich.markdown', 'matplotlib'} & set(sys.modules)\n"
-        "sys.exit(f'imported: {heavy}' if heavy else code)"
+        f"assert main({tokens!r}) == 0\n"
+        f"print(*({HEAVY} & set(sys.modules)), file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=cwd)
     assert done.returncode == 0, done.stderr
-    for verb in (
-        "scan",
-        "fill",
-        "recover",
-        "convert",
-        "demo",
-        "models",
-        "doctor",
-        "bench",
-        "data",
-        "train",
-        "export",
-    ):
-        assert verb in done.stdout
+    return done.stdout, set(done.stderr.split())
 
 
-@pytest.mark.parametrize(
-    "verb", ["scan", "fill", "recover", "convert", "demo", "models", "doctor", "bench", "data"]
-)
+def test_help_imports_nothing_heavy(tmp_path):
+    """What makes `interpose --help` start at once: nothing but the standard library is imported."""
+    out, imported = imported_by(["--help"], tmp_path)
+    assert imported == set()
+    assert VERBS == ["scan", "fill", "recover", "convert", "demo", "models", "doctor", "bench", "data", "train", "export"]
+    for verb in VERBS:
+        assert f"\n  {verb} " in out
+    assert max(map(len, out.splitlines())) <= 85
+
+
+def test_the_help_of_a_verb_imports_only_the_parser(tmp_path):
+    _, imported = imported_by(["fill", "--help"], tmp_path)
+    assert imported <= {"cyclopts", "rich"}
+
+
+def test_without_arguments_help_is_shown(run):
+    assert run().out == run("--help").out == run("-h").out
+
+
+@pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_explains_itself(run, verb):
     done = run(verb, "--help")
     assert done.code == 0
     assert f"Usage: interpose {verb}" in done.out
+    assert len(done.out.splitlines()) > 8
 
 
 def test_the_help_of_fill_shows_how(run):
@@ -74,7 +83,7 @@ def test_the_help_of_fill_shows_how(run):
 def test_version(run):
     project = tomllib.loads((SOURCE.parent / "pyproject.toml").read_text())["project"]
     assert interpose.__version__ == project["version"]
-    assert run("--version").out.strip() == f"interpose {interpose.__version__}"
+    assert run("--version").out == f"interpose {interpose.__version__}\n"
 
 
 def test_demo(run, tmp_path):

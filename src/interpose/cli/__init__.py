@@ -11,49 +11,54 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from cyclopts import App, CycloptsError, Group, Parameter
-
 from interpose import __version__
-from interpose.cli import bench, convert, data, demo, doctor, export, fill, models, recover, scan, train
-from interpose.cli.console import complain, usage_error
 from interpose.errors import InterposeError
 
-HELP = """
-Fills gaps in human motion clips (.bvh, .npz): your skeleton, your file.
+# Verbs by group, in the order of the help; `app` finds each in the module of its name.
+VERBS = {
+    "Your clips": {
+        "scan": "find what looks missing: frozen runs, stray rest poses",
+        "fill": "fill gaps; what is not missing comes back unchanged",
+        "recover": "recover joints that are missing in the whole clip or in a range",
+        "convert": "write a clip in another format, or at another frame rate",
+    },
+    "Getting to know it": {
+        "demo": "see a gap filled in a real clip",
+        "models": "list the methods that fill gaps, and the trained models",
+        "doctor": "check that everything works on this machine",
+    },
+    "Research": {
+        "bench": "measure how good the methods are, by published protocols",
+        "data": "what there is of the public data sets, and packing it for training",
+        "train": "train a network (needs PyTorch: pip install 'interpose[train]')",
+        "export": "turn a training run into weights with a card (needs PyTorch)",
+    },
+}
 
-First:
+HELP = """\
+interpose fills gaps in human motion clips (.bvh, .npz): your skeleton, your file.
+
+Start here:
   interpose demo                          see a gap filled in a real clip
   interpose scan take.bvh                 find what is missing in your clip
   interpose fill take.bvh --gap 120:160   fill frames 120 to 159 of it
   interpose fill --help                   all about a verb
 
-Frames count from 0; a range stops before its second number.
-With --debug (or INTERPOSE_DEBUG=1) errors show where they come from.
+{verbs}
+Options:
+  --help, --version
+  --debug   show where an error comes from (or set INTERPOSE_DEBUG=1)
+
+Frames count from 0, and a range stops before its second number.
 """
 
-app = App(
-    name="interpose",
-    help=HELP,
-    version=f"interpose {__version__}",
-    help_format="plaintext",
-    version_format="plaintext",
-    default_parameter=Parameter(negative=(), show_default=False),
-    suppress_keyboard_interrupt=False,
-)
-app["--help"].group = app["--version"].group = Group("About", sort_key=9)
 
-VERBS = {
-    Group("Your clips", sort_key=1): (scan.scan, fill.fill, recover.recover, convert.convert),
-    Group("Getting to know it", sort_key=2): (demo.demo, models.models, doctor.doctor),
-    Group("Research", sort_key=3): (bench.app, data.app, train.app, export.app),
-}
-for group, verbs in VERBS.items():
-    for place, verb in enumerate(verbs):
-        if isinstance(verb, App):
-            verb.group, verb.sort_key = group, place
-            app.command(verb)
-        else:
-            app.command(verb, group=group, sort_key=place)
+def root_help() -> str:
+    """What `interpose --help` prints."""
+    groups = []
+    for group, verbs in VERBS.items():
+        groups += [f"{group}:", *(f"  {verb:9} {summary}" for verb, summary in verbs.items()), ""]
+    return HELP.format(verbs="\n".join(groups))
 
 
 def main(tokens: Sequence[str] | None = None) -> int:
@@ -62,25 +67,13 @@ def main(tokens: Sequence[str] | None = None) -> int:
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
     try:
-        with warnings.catch_warnings():
-            if not debug:
-                warnings.simplefilter("ignore")
-            code = app(
-                tokens,
-                exit_on_error=False,
-                print_error=False,
-                help_on_error=False,
-                result_action="return_value",
-            )
+        code = _run(tokens, debug)
         sys.stdout.flush()
-        return code if isinstance(code, int) else 0
-    except CycloptsError as error:
-        complain(usage_error(error))
-        return 2
+        return code
     except InterposeError as error:
         if debug:
             raise
-        complain(error)
+        _complain(error)
         return error.exit_code
     except KeyboardInterrupt:
         return 130
@@ -92,11 +85,29 @@ def main(tokens: Sequence[str] | None = None) -> int:
         if debug:
             raise
         kind = type(error).__name__
-        complain(
-            InterposeError(
-                f"interpose failed: {error or kind}",
-                f"a {kind} that it should have foreseen",
-                "Run it again with --debug and report what that prints.",
-            )
-        )
+        why = f"a {kind} that it should have foreseen"
+        fix = "Run it again with --debug and report what that prints."
+        _complain(InterposeError(f"interpose failed: {error or kind}", why, fix))
         return 1
+
+
+def _run(tokens: list[str], debug: bool) -> int:
+    # Answered without the parser, whose import takes longer than anyone should wait for help.
+    if not tokens or tokens[0] in ("--help", "-h"):
+        sys.stdout.write(root_help())
+        return 0
+    if tokens[0] == "--version":
+        print(f"interpose {__version__}")
+        return 0
+    from interpose.cli.app import run
+
+    with warnings.catch_warnings():
+        if not debug:
+            warnings.simplefilter("ignore")
+        return run(tokens)
+
+
+def _complain(error: InterposeError) -> None:
+    from interpose.cli.console import complain
+
+    complain(error)

@@ -12,10 +12,10 @@ from cyclopts import App
 
 from interpose.cli.console import console, say, say_json
 
-app = App(name="bench", help="Measure how good the methods are, by published protocols.")
+bench = App(name="bench", help="Measure how good the methods are, by published protocols.")
 
 
-@app.command
+@bench.command
 def infilling(
     *,
     data: Path = Path("data"),
@@ -46,7 +46,7 @@ def infilling(
         say(result.table() if markdown else str(result))
 
 
-@app.command
+@bench.command
 def threshold(
     *,
     data: Path = Path("data"),

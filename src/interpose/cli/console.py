@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from interpose.errors import InterposeError, RequestError
+from interpose.errors import InterposeError
 
 if TYPE_CHECKING:
-    from cyclopts import CycloptsError
     from rich.console import Console
 
 # Work on fewer frames than this is over before anyone wonders.
@@ -104,48 +103,3 @@ def complain(error: InterposeError) -> None:
     screen.print(f"error: {first}", style="bold red")
     for line in rest:
         screen.print(f"  {line}")
-
-
-def usage_error(error: CycloptsError) -> RequestError:
-    """What is wrong with a command line, in the words of all other errors."""
-    import difflib
-
-    from cyclopts import (
-        CoercionError,
-        MissingArgumentError,
-        RepeatArgumentError,
-        UnknownCommandError,
-        UnknownOptionError,
-        UnusedCliTokensError,
-    )
-
-    verb = " ".join(["interpose", *(error.command_chain or ())])
-    see = f"{verb} --help explains it."
-    if isinstance(error, UnknownCommandError):
-        known = [name for name in error.app or () if not name.startswith("-")]
-        name = (error.unused_tokens or [""])[0]
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"Did you mean {near[0]}? " if near else ""
-        return RequestError(f"unknown verb: {name}", f"{verb} knows: {', '.join(known)}", hint + see)
-    if isinstance(error, UnknownOptionError):
-        name = error.token.keyword or error.token.value
-        known = [name for argument in error.argument_collection for name in argument.names if argument.parse]
-        near = difflib.get_close_matches(name, known, n=1)
-        hint = f"Did you mean {near[0]}? " if near else ""
-        return RequestError(f"unknown option: {name}", f"{verb} has none of that name", hint + see)
-    if isinstance(error, MissingArgumentError) and error.argument is not None:
-        given = error.keyword or next((t.keyword for t in error.argument.tokens if t.keyword), None)
-        if given:
-            return RequestError(f"{given} is incomplete", "nothing follows it", see)
-        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without", see)
-    if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
-        kind = {int: "a whole number", float: "a number"}.get(error.target_type, "of the right kind")  # type: ignore[arg-type]
-        return RequestError(
-            f"cannot use {error.token.keyword} {error.token.value}", f"its value must be {kind}", see
-        )
-    if isinstance(error, RepeatArgumentError) and error.token.keyword:
-        return RequestError(f"{error.token.keyword} stands there twice", "it takes one value", see)
-    if isinstance(error, UnusedCliTokensError):
-        extra = " ".join(error.unused_tokens or ())
-        return RequestError(f"do not know what to do with: {extra}", f"{verb} takes fewer arguments", see)
-    return RequestError("the command line is wrong", str(error), see)

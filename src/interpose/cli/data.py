@@ -10,10 +10,10 @@ from cyclopts import App
 from interpose.cli.console import say, say_json, say_table
 from interpose.errors import RequestError
 
-app = App(name="data", help="The public data sets: what is there, and packing it for training.")
+data = App(name="data", help="The public data sets: what is there, and packing it for training.")
 
 
-@app.command
+@data.command
 def info(*, data: Path = Path("data"), json: bool = False) -> None:
     """Count the clips of each data set, and how they are split by performer.
 
@@ -46,7 +46,7 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
     say_table(("data set", *columns), rows, right=columns)
 
 
-@app.command
+@data.command
 def pack(*names: str, data: Path = Path("data"), out: Path = Path("packs"), force: bool = False) -> None:
     """Pack data sets for training: one small file each, without the test performers.
 

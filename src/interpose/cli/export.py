@@ -11,10 +11,10 @@ from interpose.cli.research import needs_torch
 from interpose.cli.train import check_splits, load_packs
 from interpose.errors import FileError
 
-app = App(name="export", help="Turn a training run into weights with a card (needs PyTorch).")
+export = App(name="export", help="Turn a training run into weights with a card (needs PyTorch).")
 
 
-@app.command
+@export.command
 def cae(
     *,
     run: Path,

@@ -15,7 +15,7 @@ from interpose.errors import FileError, RequestError
 if TYPE_CHECKING:
     from interpose.datasets import Pack
 
-app = App(name="train", help="Train a network (needs PyTorch: pip install 'interpose[train]').")
+train = App(name="train", help="Train a network (needs PyTorch: pip install 'interpose[train]').")
 SPLITS = ("train", "validation")
 
 
@@ -42,7 +42,7 @@ def check_splits(texts: list[str]) -> tuple[str, ...]:
     return splits
 
 
-@app.command
+@train.command
 def cae(*, packs: Path = Path("packs"), out: Path, budget: str = "25m", splits: list[str] = []) -> None:  # noqa: B006
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 

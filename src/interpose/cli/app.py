@@ -1,0 +1,84 @@
+"""The parser: verbs are imported when they are used, and its errors speak like all others."""
+
+from __future__ import annotations
+
+import difflib
+
+from cyclopts import (
+    App,
+    CoercionError,
+    CycloptsError,
+    MissingArgumentError,
+    Parameter,
+    RepeatArgumentError,
+    UnknownCommandError,
+    UnknownOptionError,
+    UnusedCliTokensError,
+)
+
+from interpose.cli import VERBS
+from interpose.errors import RequestError
+
+app = App(
+    name="interpose",
+    help_format="plaintext",
+    version_flags=(),
+    default_parameter=Parameter(negative=(), show_default=False),
+    suppress_keyboard_interrupt=False,
+)
+for verbs in VERBS.values():
+    for verb in verbs:
+        app.command(f"interpose.cli.{verb}:{verb}", name=verb)
+
+
+def run(tokens: list[str]) -> int:
+    """Parse and call; returns the exit code. Raises RequestError when the tokens make no sense."""
+    try:
+        code = app(
+            tokens,
+            exit_on_error=False,
+            print_error=False,
+            help_on_error=False,
+            result_action="return_value",
+        )
+    except CycloptsError as error:
+        raise translate(error) from None
+    return code if isinstance(code, int) else 0
+
+
+def translate(error: CycloptsError) -> RequestError:
+    """What is wrong with a command line, in the words of all other errors."""
+    verb = " ".join(["interpose", *(error.command_chain or ())])
+    see = f"{verb} --help explains it."
+    if isinstance(error, UnknownCommandError):
+        known = [name for name in error.app or () if not name.startswith("-")]
+        name = (error.unused_tokens or [""])[0]
+        return RequestError(
+            f"unknown verb: {name}", f"{verb} knows: {', '.join(known)}", _near(name, known) + see
+        )
+    if isinstance(error, UnknownOptionError):
+        name = error.token.keyword or error.token.value
+        known = [name for argument in error.argument_collection for name in argument.names if argument.parse]
+        return RequestError(
+            f"unknown option: {name}", f"{verb} has none of that name", _near(name, known) + see
+        )
+    if isinstance(error, MissingArgumentError) and error.argument is not None:
+        given = error.keyword or next((t.keyword for t in error.argument.tokens if t.keyword), None)
+        if given:
+            return RequestError(f"{given} is incomplete", "nothing follows it", see)
+        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without", see)
+    if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
+        kinds: dict[object, str] = {int: "a whole number", float: "a number"}
+        why = f"its value must be {kinds[error.target_type]}" if error.target_type in kinds else str(error)
+        return RequestError(f"cannot use {error.token.keyword} {error.token.value}", why, see)
+    if isinstance(error, RepeatArgumentError) and error.token.keyword:
+        return RequestError(f"{error.token.keyword} stands there twice", "it takes one value", see)
+    if isinstance(error, UnusedCliTokensError):
+        extra = " ".join(error.unused_tokens or ())
+        return RequestError(f"do not know what to do with: {extra}", f"{verb} takes fewer arguments", see)
+    return RequestError("the command line is wrong", str(error), see)
+
+
+def _near(name: str, known: list[str]) -> str:
+    near = difflib.get_close_matches(name, known, n=1)
+    return f"Did you mean {near[0]}? " if near else ""
