@@ -36,7 +36,7 @@ class Job:
 
 def fill(
     clip: Clip,
-    gaps: Sequence[Gap],
+    gaps: Sequence[Gap] | Observation,
     method: str = "auto",
     max_gap: int | None = None,
     only: Sequence[int] | None = None,
@@ -48,7 +48,8 @@ def fill(
 
     Args:
         clip: F frames; its values inside the gaps have no influence.
-        gaps: what is missing; gaps that touch or overlap count as one.
+        gaps: what is missing, or an observation that says for every value whether it is known. Gaps that
+            touch or overlap count as one.
         method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length.
         max_gap: frames; longer gaps stay open.
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
@@ -62,7 +63,7 @@ def fill(
     Raises:
         RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
     """
-    observation = Observation.from_gaps(clip, gaps)
+    observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     jobs = plan(clip, observation, method, max_gap, only, methods or {})
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)

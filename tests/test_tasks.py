@@ -1,0 +1,217 @@
+"""What the verbs mean: plans, windows, what stays open, long and odd clips."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import textwrap
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from interpose import tasks
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import complete
+from interpose.geometry.time import resample
+from interpose.methods import registry, weights
+from interpose.observation import Gap, Observation
+
+METHODS = ("zero-velocity", "linear", "spline", "cae", "auto")
+
+
+def _same(one: Clip, other: Clip, frames: slice) -> bool:
+    return bool(
+        np.array_equal(one.rotation[frames], other.rotation[frames])
+        and np.array_equal(one.translation[frames], other.translation[frames])
+    )
+
+
+@pytest.fixture(scope="module")
+def long_walk(cmu_walk):  # type: ignore[no-untyped-def]
+    """The walk six times over, there and back again, so that it is continuous: 1,250 frames."""
+    there = np.arange(len(cmu_walk))
+    frames = np.concatenate([there, there[::-1]] * 3)
+    return replace(
+        cmu_walk, rotation=cmu_walk.rotation[frames], translation=cmu_walk.translation[frames], source=None
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_what_is_observed_comes_back_and_gaps_are_filled(cmu_walk, method):
+    done = tasks.fill(cmu_walk, [Gap(60, 90), Gap(120, 130, ("LeftArm", "LeftForeArm"))], method)
+    assert _same(done.clip, cmu_walk, slice(0, 60)) and _same(done.clip, cmu_walk, slice(90, 120))
+    arm = [cmu_walk.skeleton.index(name) for name in ("LeftArm", "LeftForeArm")]
+    others = [j for j in range(len(cmu_walk.skeleton)) if j not in arm]
+    assert np.array_equal(done.clip.rotation[120:130, others], cmu_walk.rotation[120:130, others])
+    assert not np.array_equal(done.clip.rotation[60:90], cmu_walk.rotation[60:90])
+    assert [gap.number for gap in done.report.gaps] == [1, 2]
+    assert (done.provenance[60:90] > 0).all() and not done.provenance[:60].any()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_nothing_leaks(cmu_walk, method):
+    gaps = [Gap(60, 90), Gap(120, 130, ("LeftArm", "Spine"))]
+    seen = Observation.from_gaps(cmu_walk, gaps)
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[~seen.rotation] = [0.3, -0.5, 0.1, 0.8]
+    translation[60:90] = 1e5
+    poisoned = cmu_walk.with_motion(rotation, translation)
+    one, other = (tasks.fill(clip, gaps, method).clip for clip in (cmu_walk, poisoned))
+    assert one.rotation.tobytes() == other.rotation.tobytes()
+    assert one.translation.tobytes() == other.translation.tobytes()
+
+
+def test_a_gap_of_a_long_clip_is_the_gap_of_its_window(long_walk):
+    """The window holds all that counts, but for the clip's own acceleration, which limits the seams."""
+    gap = Gap(600, 630)
+    margin = round(tasks.CONTEXT * long_walk.fps)
+    lo, hi = gap.start - margin, gap.stop + margin
+    whole = tasks.fill(long_walk, [gap], "cae").clip
+    alone = tasks.fill(long_walk.slice(lo, hi), [Gap(margin, margin + 30)], "cae").clip
+    assert np.abs(whole.rotation[600:630] - alone.rotation[margin : margin + 30]).max() < 0.02
+
+
+def test_gaps_do_not_depend_on_each_other_s_filling(long_walk):
+    near = [Gap(300, 330), Gap(340, 370)]
+    together = tasks.fill(long_walk, near, "spline").clip
+    first = tasks.fill(long_walk, near, "spline", only=[1]).clip
+    assert _same(together, first, slice(300, 330))
+
+
+def test_only_and_max_gap_leave_gaps_open(cmu_walk):
+    gaps = [Gap(20, 30), Gap(60, 100), Gap(120, 130)]
+    done = tasks.fill(cmu_walk, gaps, "linear", max_gap=20)
+    assert [(g.start, g.stop) for g in done.report.open] == [(60, 100)]
+    assert _same(done.clip, cmu_walk, slice(60, 100))
+    done = tasks.fill(cmu_walk, gaps, "linear", only=[3])
+    assert [g.number for g in done.report.gaps] == [3] and len(done.report.open) == 2
+    with pytest.raises(RequestError, match="no gap number 4"):
+        tasks.fill(cmu_walk, gaps, "linear", only=[4])
+
+
+def test_methods_of_single_gaps(cmu_walk):
+    done = tasks.fill(cmu_walk, [Gap(20, 30), Gap(60, 90)], "linear", methods={2: "spline"})
+    assert [g.method for g in done.report.gaps] == ["linear", "spline"]
+
+
+def test_auto_goes_by_length_and_by_what_the_network_can(cmu_walk):
+    card = weights.find("cae")
+    short, long = max(1, card.auto["from_gap"] - 1), card.auto["from_gap"] + 1
+    too_long = card.max_gap + 1
+    names = [job.method.name for length in (short, long, too_long) for job in _plan(cmu_walk, length)]
+    assert names[2] == "spline"
+    if 1 < card.auto["from_gap"] < card.max_gap:
+        assert names[:2] == ["spline", "cae"]
+
+
+def _plan(clip, length):  # type: ignore[no-untyped-def]
+    seen = Observation.from_gaps(clip, [Gap(60, 60 + length)])
+    return tasks.plan(clip, seen, "auto", None, None, {})
+
+
+def test_too_long_for_the_network_is_filled_by_the_spline_and_said(cmu_walk):
+    done = tasks.fill(cmu_walk, [Gap(40, 140)], "cae")
+    assert done.report.gaps[0].method == "spline"
+    assert "100 frames" in " ".join(done.report.gaps[0].notes)
+
+
+def test_unknown_humanoid_is_refused_with_the_reason(cmu_walk):
+    names = tuple(f"bone{j}" for j in range(len(cmu_walk.skeleton)))
+    strange = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, names=names), source=None)
+    report = tasks.fill(strange, [Gap(60, 90)], "cae").report.gaps[0]
+    assert report.method == "spline" and "no joints for Hips" in " ".join(report.notes)
+
+
+@pytest.mark.parametrize("fps", [24, 25, 60, 120])
+def test_frame_rates(cmu_walk, fps):
+    """The network thinks at 30 fps; the clip comes back at its own rate, near what it is at 30."""
+    clip = resample(cmu_walk, fps)
+    start, stop = round(2 * fps), round(3 * fps)
+    done = tasks.fill(clip, [Gap(start, stop)], "cae")
+    assert done.report.gaps[0].method == "cae", done.report
+    assert _same(done.clip, clip, slice(0, start)) and _same(done.clip, clip, slice(stop, None))
+    here = tasks.fill(cmu_walk, [Gap(60, 90)], "cae").clip.positions()[75]
+    there = done.clip.positions()[round(2.5 * fps)]
+    assert np.linalg.norm(here - there, axis=-1).mean() < 0.05
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(
+    ("frames", "gaps"),
+    [
+        (1, []),
+        (1, [Gap(0, 1)]),
+        (2, [Gap(1, 2)]),
+        (40, [Gap(0, 40)]),
+        (60, [Gap(0, 20)]),
+        (60, [Gap(40, 60)]),
+        (60, [Gap(20, 30), Gap(30, 40)]),
+        (60, [Gap(20, 30), Gap(31, 40)]),
+    ],
+)
+def test_odd_clips(cmu_walk, method, frames, gaps):
+    clip = cmu_walk.slice(0, frames)
+    done = tasks.fill(clip, gaps, method)
+    assert np.isfinite(done.clip.rotation).all() and np.isfinite(done.clip.translation).all()
+    assert np.allclose(np.linalg.norm(done.clip.rotation, axis=-1), 1)
+    seen = Observation.from_gaps(clip, gaps)
+    assert np.array_equal(done.clip.rotation[seen.rotation], clip.rotation[seen.rotation])
+
+
+def test_joints_lost_for_long_are_recovered_in_pieces_that_agree(long_walk):
+    joints = ("LeftArm", "LeftForeArm")
+    done = tasks.recover(long_walk, joints, method="cae")
+    assert done.report.gaps[0].method == "cae"
+    arm = long_walk.skeleton.index("LeftHand")
+    hand = done.clip.positions()[:, arm]
+    speed = np.linalg.norm(np.diff(hand, axis=0), axis=-1)
+    seams = [round(tasks.PIECE * 30) - k for k in range(round(tasks.OVERLAP * 30) + 2)]
+    assert speed[seams].max() < 3 * np.percentile(speed, 99)
+    legs = [j for j, name in enumerate(long_walk.skeleton.names) if "Leg" in name]
+    assert np.array_equal(done.clip.rotation[:, legs], long_walk.rotation[:, legs])
+
+
+def test_progress_goes_up_to_one(long_walk):
+    shares: list[float] = []
+    tasks.fill(long_walk, [Gap(100, 110), Gap(300, 310), Gap(500, 510)], "linear", progress=shares.append)
+    assert shares == sorted(shares) and shares[-1] == 1 and len(shares) == 3
+
+
+def test_an_observation_says_the_same_as_its_gaps(cmu_walk):
+    gaps = [Gap(60, 90)]
+    by_gaps = tasks.fill(cmu_walk, gaps, "spline").clip
+    by_observation = tasks.fill(cmu_walk, Observation.from_gaps(cmu_walk, gaps), "spline").clip
+    assert _same(by_gaps, by_observation, slice(None))
+
+
+def test_one_window_is_what_finish_makes_of_it(cmu_walk):
+    """A clip no longer than its window goes through `complete` as it is."""
+    clip, gap = cmu_walk.slice(20, 120), Gap(40, 60)
+    mine = tasks.fill(clip, [gap], "spline").clip
+    theirs = complete(clip, Observation.from_gaps(clip, [gap]), registry.get("spline")).clip
+    assert _same(mine, theirs, slice(None))
+
+
+def test_half_an_hour_takes_less_than_a_gigabyte(data):
+    """54,000 frames of 31 joints with gaps, filled by network and spline, in a process of its own."""
+    program = f"""
+        import resource
+        from dataclasses import replace
+        import numpy as np
+        from interpose import tasks
+        from interpose.formats import load
+        from interpose.observation import Gap
+        walk = load({str(data / "cmu_walk.bvh")!r})
+        there = np.arange(len(walk))
+        frames = np.resize(np.concatenate([there, there[::-1]]), 54_000)
+        clip = replace(walk, rotation=walk.rotation[frames], translation=walk.translation[frames], source=None)
+        tasks.fill(clip, [Gap(30_000, 30_040), Gap(40_000, 40_005)], "cae")
+        tasks.fill(clip, [Gap(1_000, 1_030)], "spline")
+        print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+    """
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) < 1_000_000, "kilobytes"
