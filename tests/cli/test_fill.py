@@ -142,6 +142,8 @@ def test_a_dry_run_writes_nothing(run, take):
     assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
     assert "longer than --max-gap 40" in done.out
     assert "take.filled.html" in done.out
+    (take.parent / "take.filled.bvh").write_text("mine")
+    assert "--force" in run("fill", "take.bvh", "--gap", "20:30", "--dry-run").out
     planned = run("fill", "take.bvh", "--gap", "20:30", "--method", "linear", "--dry-run", "--json").json
     assert planned["would_fill"] == [{"number": 1, "frames": "20:30", "joints": None, "method": "linear"}]
 

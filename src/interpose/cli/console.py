@@ -71,7 +71,7 @@ def names(joints: Sequence[str] | None, most: int = 4) -> str:
     if joints is None:
         return "all"
     shown = ", ".join(joints[:most])
-    return shown + (f" and {len(joints) - most} more" if len(joints) > most else "")
+    return shown + (f" +{len(joints) - most}" if len(joints) > most else "")
 
 
 @contextmanager

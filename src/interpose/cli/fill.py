@@ -81,9 +81,9 @@ def fill(
         fix = "Write for example --max-gap 90."
         raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
     outputs = Outputs.choose(file, output, "filled", player)
-    outputs.check(file, force)
     if dry_run:
-        return _dry_run(file, clip, request, max_gap, outputs, json)
+        return _dry_run(file, clip, request, max_gap, outputs, json, force)
+    outputs.check(file, force)
     missing = sum(map(len, request.gaps))
     with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
         done = tasks.fill(
@@ -108,7 +108,13 @@ def _why(gap: Gap, max_gap: int | None) -> str:
 
 
 def _dry_run(
-    file: Path, clip: Clip, request: Request, max_gap: int | None, outputs: Outputs, as_json: bool
+    file: Path,
+    clip: Clip,
+    request: Request,
+    max_gap: int | None,
+    outputs: Outputs,
+    as_json: bool,
+    force: bool,
 ) -> int:
     """Say what would be done."""
     from interpose import tasks
@@ -150,4 +156,8 @@ def _dry_run(
     )
     say()
     say(f"a dry run: nothing is written. Without --dry-run: {', '.join(map(str, outputs.all))}")
+    try:
+        outputs.check(file, force)
+    except RequestError as error:
+        say(f"That would end with: {error.what}; {error.why}. {error.fix}")
     return 4 if left else 0

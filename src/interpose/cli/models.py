@@ -77,6 +77,8 @@ def _lines(value: Any, indent: str = "") -> list[str]:
             for one in item:
                 first, *rest = _lines(one, indent + "    ")
                 lines += [f"{indent}  - {first.strip()}", *rest]
+        elif isinstance(item, list) and len(item) > 24:
+            lines.append(f"{indent}{title}: {len(item)} numbers, see --json")
         elif isinstance(item, list):
             lines.append(f"{indent}{title}: {', '.join(map(str, item))}")
         elif item not in ({}, "", None):
