@@ -116,7 +116,7 @@ def test_files_that_are_none(run, tmp_path):
     (tmp_path / "folder.bvh").mkdir()
     (tmp_path / "binary.bvh").write_bytes(bytes(range(256)) * 40)
     (tmp_path / "binary.npz").write_bytes(bytes(range(256)) * 40)
-    for name in ("folder.bvh", "binary.bvh", "binary.npz", "missing.bvh"):
+    for name in (".", "folder.bvh", "binary.bvh", "binary.npz", "missing.bvh"):
         done = run("scan", name)
         assert done.code == 3
         assert name in three_lines(done.err)[0]

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
 
+from interpose.errors import FileError
+
 if TYPE_CHECKING:
     from interpose.clip import Clip
 
@@ -30,6 +32,8 @@ class Reading:
         """The clip in a file."""
         from interpose.formats import load
 
+        if path.is_dir():  # whatever its name ends in
+            raise FileError(f"cannot read {path}", "it is a directory", "Name one file in it.")
         return load(path, self.unit, self.up, self.joint_positions)
 
 
