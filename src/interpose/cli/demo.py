@@ -123,6 +123,6 @@ def _truth(clip: Clip, gap: Gap) -> list[str]:
 
     seen = Observation.from_gaps(clip, [gap])
     slide, travel = feet.measure(clip, seen, gap.start, gap.stop) or (0.0, 0.0)
-    ends = np.array([gap.start - 1, gap.start, gap.stop - 1, gap.stop])
+    ends = np.array([gap.start - 1, gap.stop])  # as in the report of a gap
     jump = 100 * seam_jump(clip.positions(), ends)
     return ["truth", f"{jump:.2f}", "0.00 cm", f"{slide:.1f} cm/s", f"{travel:.2f} m", "0.0 cm"]

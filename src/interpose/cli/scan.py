@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 from interpose.cli.console import names, say, say_json, say_table, seconds
 from interpose.cli.reading import Reading, describe, details
@@ -50,7 +51,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     )
     say()
     if to_gaps(found):
-        say(f"interpose fill {file} fills these; --gap START:STOP names one yourself.")
+        say(f"interpose fill {quote(str(file))} fills these; --gap START:STOP names one yourself.")
     else:
         say(
             "A position alone cannot be filled; name the frames of the whole pose with fill --gap START:STOP."
