@@ -114,25 +114,12 @@ def fill(
     """
     from interpose import tasks
     from interpose.errors import RequestError
-    from interpose.finish import complete
-    from interpose.methods import auto, registry
     from interpose.observation import Observation
     from interpose.observation.scan import scan, to_gaps
 
     clip = _clip(clip)
-    if isinstance(gaps, Observation):
-        if max_gap is not None or only is not None:
-            raise RequestError(
-                "max_gap and only do not go with an Observation",
-                "they choose among gaps, and an observation has none of its own",
-                "Give gaps instead, for example observation.gaps(clip.skeleton).",
-            )
-        missing = gaps.gaps(clip.skeleton)
-        if method == "auto" and missing:
-            return complete(clip, gaps, auto.choose(clip, max(missing, key=len)), seed)
-        return complete(clip, gaps, registry.get("spline" if method == "auto" else method), seed)
     if gaps is None:
-        wanted = to_gaps(scan(clip))
+        wanted: Observation | list[Gap] = to_gaps(scan(clip))
         if not wanted:
             raise RequestError(
                 "nothing to fill",
@@ -140,7 +127,7 @@ def fill(
                 'Give gaps="120:160".',
             )
     else:
-        wanted = [_gap(gap) for gap in _several(gaps)]
+        wanted = gaps if isinstance(gaps, Observation) else [_gap(gap) for gap in _several(gaps)]
     return tasks.fill(clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress)
 
 

@@ -64,6 +64,12 @@ def fill(
         RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
+    if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
+        raise RequestError(
+            "there is nothing to go by",
+            "no value of the clip is observed, so any motion would do",
+            "Leave at least one frame out of the gaps.",
+        )
     jobs = plan(clip, observation, method, max_gap, only, methods or {})
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
@@ -86,6 +92,7 @@ def fill(
         reports += _shifted(part.report.gaps, lo, start, stop, job.number)
         if progress:
             progress((done + 1) / len(work))
+    reports = _joined(reports)
     left = [job.gap for job in jobs if job.method is None]
     report = Report(method, reports, left)
     return Completion(clip.with_motion(rotation, translation), raw.done(), provenance, report)
@@ -180,6 +187,41 @@ def _shifted(
         if one.start + by < stop and one.stop + by > start:
             first, last = max(one.start + by, start), min(one.stop + by, stop)
             yield replace(one, start=first, stop=last, number=number)
+
+
+def _joined(reports: list[GapReport]) -> list[GapReport]:
+    """One report for a gap that was completed in pieces: the worst of its seams and bones, means of the rest."""
+    done: list[GapReport] = []
+    for one in reports:
+        last = done[-1] if done else None
+        if last is None or (last.number, last.joints, last.method) != (one.number, one.joints, one.method):
+            done.append(one)
+            continue
+        share = (one.stop - last.stop) / max(one.stop - last.start, 1)
+        done[-1] = replace(
+            last,
+            stop=one.stop,
+            seam_before=_over(max, last.seam_before, one.seam_before),
+            seam_after=_over(max, last.seam_after, one.seam_after),
+            bone_deviation=max(last.bone_deviation, one.bone_deviation),
+            solve_error=_over(lambda a, b: a + share * (b - a), last.solve_error, one.solve_error),
+            foot_slide=_over(lambda a, b: a + share * (b - a), last.foot_slide, one.foot_slide),
+            foot_slide_before=_over(
+                lambda a, b: a + share * (b - a), last.foot_slide_before, one.foot_slide_before
+            ),
+            foot_travel=_over(lambda a, b: a + b, last.foot_travel, one.foot_travel),
+            notes=tuple(dict.fromkeys(last.notes + one.notes)),
+        )
+    return done
+
+
+def _over(
+    combine: Callable[[float, float], float], one: float | None, other: float | None
+) -> float | None:
+    """Two measures combined; where only one was taken, that."""
+    if one is None or other is None:
+        return other if one is None else one
+    return combine(one, other)
 
 
 class _RawClip:
