@@ -15,7 +15,7 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping
 
 
-def network_like(truth: Clip, sigma: float = 0.02, bias: float = 0.0, scale: float = 1.0) -> tuple:
+def positions_of(truth: Clip, sigma: float = 0.02, bias: float = 0.0, scale: float = 1.0) -> tuple:
     """Mapped joints and their positions (F, n, 3): the truth, scaled about the root's ground point, moved
     sideways, and with slow noise of `sigma` metres."""
     joints = tuple(j for j in find_mapping(truth.skeleton).joints if j is not None)
@@ -37,7 +37,7 @@ class Speaking:
 
     def __init__(self, truth: Clip, **kwargs: float) -> None:
         self.name = "speaking"
-        self.joints, self.positions = network_like(truth, **kwargs)
+        self.joints, self.positions = positions_of(truth, **kwargs)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         return None
@@ -51,8 +51,7 @@ METHODS = {
     "zero-velocity": lambda truth: ZeroVelocity(),
     "linear": lambda truth: Linear(),
     "spline": lambda truth: Spline(),
-    "network": lambda truth: Speaking(truth),
-    "poor network": lambda truth: Speaking(truth, sigma=0.03, bias=0.03, scale=1.03),
+    "network": lambda truth: Speaking(truth, sigma=0.03, bias=0.03, scale=1.03),
 }
 
 
@@ -68,5 +67,13 @@ def walk(cmu_walk: Clip) -> Clip:
     return replace(cmu_walk.slice(0, 120), name="walk")
 
 
-def gaps_of(clip: Clip, *ranges: tuple[int, int]) -> Observation:
-    return Observation.from_gaps(clip, [Gap(start, stop) for start, stop in ranges])
+@pytest.fixture(scope="session")
+def network_like():
+    """Makes positions from the truth, see `positions_of`."""
+    return positions_of
+
+
+@pytest.fixture(scope="session")
+def speaking():
+    """Makes a method that says positions, from the truth."""
+    return Speaking

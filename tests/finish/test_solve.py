@@ -9,11 +9,13 @@ from interpose.clip import Clip, Skeleton
 from interpose.finish.solve import solve, solve_error
 from interpose.geometry import rotations
 from interpose.methods.classical import Linear, Spline
-from interpose.observation import Observation
-
-from .conftest import gaps_of, network_like
+from interpose.observation import Gap, Observation
 
 GAP = slice(40, 80)
+
+
+def gaps_of(clip: Clip, *ranges: tuple[int, int]) -> Observation:
+    return Observation.from_gaps(clip, [Gap(start, stop) for start, stop in ranges])
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +24,14 @@ def hidden(walk):
     return Spline().complete(walk, known).clip, known
 
 
-def test_true_positions_come_back_within_a_millimetre(walk, hidden):
+def test_true_positions_come_back_within_a_millimetre(walk, hidden, network_like):
     joints, positions = network_like(walk, sigma=0.0)
     base, known = hidden
     assert solve_error(base, joints, positions)[GAP].max() > 0.05
     assert solve_error(solve(base, known, joints, positions), joints, positions)[GAP].max() < 1e-3
 
 
-def test_noisy_positions_are_met_better_than_their_noise(walk, hidden):
+def test_noisy_positions_are_met_better_than_their_noise(walk, hidden, network_like):
     joints, positions = network_like(walk, sigma=0.02)
     solved = solve(*hidden, joints, positions)
     assert solve_error(solved, joints, positions)[GAP].mean() < 0.013
@@ -38,13 +40,13 @@ def test_noisy_positions_are_met_better_than_their_noise(walk, hidden):
     assert true < 1.05 * raw
 
 
-def test_too_long_bones_are_shared_out(walk, hidden):
+def test_too_long_bones_are_shared_out(walk, hidden, network_like):
     """3 % of a body is up to 5 cm at the head; what bones allow is much nearer."""
     joints, positions = network_like(walk, sigma=0.0, scale=1.03)
     assert solve_error(solve(*hidden, joints, positions), joints, positions)[GAP].mean() < 0.015
 
 
-def test_observed_values_do_not_move(walk, hidden):
+def test_observed_values_do_not_move(walk, hidden, network_like):
     joints, positions = network_like(walk, sigma=0.05)
     base, known = hidden
     arm = [walk.skeleton.index(n) for n in ("LeftArm", "LeftForeArm")]
@@ -57,7 +59,7 @@ def test_observed_values_do_not_move(walk, hidden):
     assert not np.array_equal(solved.rotation[GAP, arm], base.rotation[GAP, arm])
 
 
-def test_joints_that_positions_do_not_tell_keep_their_rotation(walk, hidden):
+def test_joints_that_positions_do_not_tell_keep_their_rotation(walk, hidden, network_like):
     base, known = hidden
     solved = solve(base, known, *network_like(walk))
     for name in ("LeftHandIndex1", "LThumb", "LHipJoint", "Head", "RightToeBase", "LeftHand"):
@@ -65,7 +67,7 @@ def test_joints_that_positions_do_not_tell_keep_their_rotation(walk, hidden):
         assert np.array_equal(solved.rotation[:, joint], base.rotation[:, joint]), name
 
 
-def test_smooth_positions_give_smooth_rotations(walk, hidden):
+def test_smooth_positions_give_smooth_rotations(walk, hidden, network_like):
     """The largest change of angular velocity stays in the range of the truth's."""
     base, known = hidden
     solved = solve(base, known, *network_like(walk, sigma=0.02))
@@ -79,7 +81,7 @@ def test_smooth_positions_give_smooth_rotations(walk, hidden):
 
 
 def test_the_bend_of_a_limb_tells_its_twist():
-    """A forearm bent to the other side than in the classical pose turns the upper arm, not the elbow's hinge."""
+    """A forearm bent to the other side than in the classical pose turns the upper arm, not the elbow."""
     names = ("Hips", "LeftShoulder", "LeftArm", "LeftForeArm", "LeftHand")
     bones = np.array([[0, 1, 0], [0.1, 0.4, 0], [0.1, 0, 0], [0.3, 0, 0], [0.25, 0, 0]])
     skeleton = Skeleton(names, (-1, 0, 1, 2, 3), bones)
@@ -97,7 +99,9 @@ def test_the_bend_of_a_limb_tells_its_twist():
 
 def test_hips_below_a_still_root_carry_the_motion():
     """Two animated translations: the one of the topmost known joint moves, and within its parent's axes."""
-    skeleton = Skeleton(("root", "Hips", "Spine"), (-1, 0, 1), np.array([[0, 0, 0], [0, 1, 0], [0, 0.3, 0.0]]))
+    skeleton = Skeleton(
+        ("root", "Hips", "Spine"), (-1, 0, 1), np.array([[0, 0, 0], [0, 1, 0], [0, 0.3, 0.0]])
+    )
     rotation = np.tile([1.0, 0, 0, 0], (3, 3, 1))
     rotation[:, 0] = rotations.exp(np.array([0, 0.7, 0]))
     clip = Clip(skeleton, rotation, np.zeros((3, 2, 3)), 30.0, (0, 1))
@@ -108,7 +112,7 @@ def test_hips_below_a_still_root_carry_the_motion():
     assert np.array_equal(solved.translation[:, 0], clip.translation[:, 0])
 
 
-def test_only_the_root_is_missing(walk):
+def test_only_the_root_is_missing(walk, network_like):
     known = Observation.full(walk)
     known.translation[GAP, 0] = False
     base = Linear().complete(walk, known).clip

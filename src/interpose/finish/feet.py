@@ -99,15 +99,22 @@ def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray
 def measure(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, float] | None:
     """Slide (centimetres a second) and travel (metres) of the feet from the frame before start to stop.
 
-    None for skeletons whose feet are not known by name.
+    The floor is that of the stances observed in the clip: some seconds around the range are enough. None for
+    skeletons whose feet are not known by name.
     """
+    return next(iter(measure_all(clip, known, [(start, stop)])), None)
+
+
+def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -> list[tuple[float, float]]:
+    """`measure` for several ranges (start, stop) at once; an empty list where there are no feet."""
     feet = ends(clip.skeleton)
     if not feet:
-        return None
+        return []
     positions = clip.positions()[:, feet]
     floor = local_floor(positions, known.positions(clip.skeleton)[:, feet], clip.fps)
-    part = slice(max(start - 1, 0), stop + 1)
-    return measures.foot_slide(positions[part], clip.fps, floor[part]), measures.foot_travel(positions[part])
+    parts = [slice(max(start - 1, 0), stop + 1) for start, stop in ranges]
+    slides = [measures.foot_slide(positions[part], clip.fps, floor[part]) for part in parts]
+    return list(zip(slides, [measures.foot_travel(positions[part]) for part in parts]))
 
 
 def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
@@ -128,7 +135,7 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     inside = np.zeros(len(clip), bool)
     inside[start:stop] = True
     for leg, movable in zip(legs(skeleton), free):
-        movable = movable & inside
+        movable = np.logical_and(movable, inside)
         if not movable.any():
             continue
         feet = placed[:, [leg.ankle, leg.toe]]

@@ -102,14 +102,14 @@ def complete(
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
     before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
-    unheld: dict[Gap, tuple[float, float] | None] = {}
+    unheld: dict[Gap, tuple[float, float]] = {}
 
     def settle(chosen: list[_Span], source: Clip) -> None:
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
             _fade(current, source, hidden, known, span)
-        unheld.update({gap: _slide(current, known, gap) for gap in gaps if _of(spans, gap) in chosen})
         for span in chosen:
+            unheld.update(_slides(current, known, span, gaps))
             _plant(current, known, span)
         for _ in range(ROUNDS):
             for span in chosen:
@@ -121,9 +121,11 @@ def complete(
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
         span.problem = span.problem or _pop(current, known, span, limit)
-    failed = [span for span in spans if span.problem and fallback.name != method.name]
+    failed = [s for s in spans if s.problem and (s.hopeless or fallback.name != method.name)]
     if failed:
-        second = _second(fallback, hidden, observation, gaps, seed).clip
+        second = _second(
+            fallback, hidden, observation, [g for g in gaps if _of(spans, g) in failed], seed
+        ).clip
         merged, own = _merge(second, hidden, known), _merge(current, hidden, known)
         for span in failed:
             _write(current, merged, span.start, (span.start, span.stop))
@@ -146,6 +148,9 @@ def complete(
         np.where(known.translation[:, columns, None], clip.translation, current.translation),
     )
     _verify(finished, clip, known)
+    held: dict[Gap, tuple[float, float]] = {}
+    for span in spans:
+        held.update(_slides(finished, known, span, gaps))
     reports = [
         _report(
             finished,
@@ -157,6 +162,7 @@ def complete(
             before[gap],
             limit,
             unheld.get(gap),
+            held.get(gap),
             method.name,
         )
         for gap in gaps
@@ -239,7 +245,7 @@ def _jump(clip: Clip, known: Observation, frames: np.ndarray) -> float | None:
     frames = frames[(frames > 0) & (frames < len(clip) - 1)]
     if frames.size == 0:
         return None
-    return max(float(np.linalg.norm(seams.jumps(clip, known, edge), axis=-1).max()) for edge in frames)
+    return float(np.linalg.norm(seams.jumps(clip, known, frames), axis=-1).max())
 
 
 def _at(gap: Gap) -> np.ndarray:
@@ -301,10 +307,12 @@ def _soften(current: Clip, known: Observation, span: _Span, limit: float | None)
     _write(current, softer, span.start, inner)
 
 
-def _slide(clip: Clip, known: Observation, gap: Gap) -> tuple[float, float] | None:
-    margin = round(feet.NEARBY * clip.fps)
-    lo, hi = max(0, gap.start - margin), min(len(clip), gap.stop + margin)
-    return feet.measure(clip.slice(lo, hi), known.slice(lo, hi), gap.start - lo, gap.stop - lo)
+def _slides(clip: Clip, known: Observation, span: _Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:
+    """Slide and travel of the feet in the gaps of a span, for skeletons that have feet."""
+    lo, hi, _ = span.around(len(clip), round(feet.NEARBY * clip.fps))
+    inside = [gap for gap in gaps if span.start <= gap.start and gap.stop <= span.stop]
+    ranges = [(gap.start - lo, gap.stop - lo) for gap in inside]
+    return dict(zip(inside, feet.measure_all(clip.slice(lo, hi), known.slice(lo, hi), ranges)))
 
 
 def _verify(finished: Clip, clip: Clip, known: Observation) -> None:
@@ -345,6 +353,7 @@ def _report(
     before: float | None,
     limit: float | None,
     unheld: tuple[float, float] | None,
+    held: tuple[float, float] | None,
     method: str,
 ) -> GapReport:
     part = finished.slice(gap.start, gap.stop)
@@ -353,7 +362,6 @@ def _report(
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
     after = _jump(finished, known, _at(gap))
-    feet_now = _slide(finished, known, gap)
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,
@@ -366,9 +374,9 @@ def _report(
         seam_after=_centi(after),
         seam_limit=_centi(limit),
         bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
-        foot_slide=feet_now[0] if feet_now else None,
+        foot_slide=held[0] if held else None,
         foot_slide_before=unheld[0] if unheld else None,
-        foot_travel=feet_now[1] if feet_now else None,
+        foot_travel=held[1] if held else None,
         drift=_centi(_drift(raw.notes, gap)) if own else None,
         notes=tuple(span.notes),
     )

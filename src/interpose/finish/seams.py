@@ -122,14 +122,18 @@ def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Cl
     return _add(raw, known, span, measure)
 
 
-def jumps(motion: Clip, known: Observation, edge: int) -> np.ndarray:
-    """(J, 3) velocity jumps of all joints at an observed frame beside a gap, in metres per frame squared.
+def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
+    """(n, J, 3) velocity jumps of all joints at n observed frames beside gaps, in metres per frame squared.
 
-    Zero for joints whose positions are observed around it: what they do is no seam.
+    Zero for joints whose positions are observed around them: what they do is no seam.
     """
-    jump = np.diff(motion.slice(edge - 1, edge + 2).positions(), 2, axis=0)[0]
-    seen = np.asarray(known.slice(edge - 1, edge + 2).positions(motion.skeleton)).all(axis=0, keepdims=True)
-    return np.where(seen.T, 0.0, jump)
+    before, after = at - 1, at + 1
+    near = np.concatenate([before, at, after])
+    where = motion.with_motion(motion.rotation[near], motion.translation[near]).positions()
+    where = where.reshape(3, len(at), *where.shape[1:])
+    seen = Observation(known.rotation[near], known.translation[near]).positions(motion.skeleton)
+    first, second, third = seen.reshape(3, len(at), -1)
+    return np.where((first & second & third)[..., None], 0.0, where[0] - 2 * where[1] + where[2])
 
 
 def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
@@ -138,37 +142,38 @@ def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float
     The first missing pose is turned, as little as possible, so that joints that jump too far go on more like
     they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
     """
-    nudges: dict[tuple[int, int], Clip] = {}
-    for edge in edges(known, motion.translated, span):
-        jump = jumps(motion, known, edge)
-        size = np.linalg.norm(jump, axis=-1, keepdims=True)
-        excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
-        if not excess.any():
-            continue
-        # Joints far below the limit may give way for those above it.
-        weights = np.where(size[:, 0] > 0.7 * limit, 1.0, 0.05)
-        for way in (1, -1):
-            at = slice(edge + way, edge + way + 1)
-            # What is missing on both sides of a lone key shares the work.
-            part = 0.5 if not known.frames[edge - way] and not known.frames[edge + way] else 1.0
-            fresh = Observation(
-                known.rotation[at] | ~known.rotation[edge], known.translation[at] | ~known.translation[edge]
-            )
-            if fresh.complete:
-                continue
-            one = motion.slice(at.start, at.stop)
-            goal, everything = one.positions() - part * excess, tuple(range(len(motion.skeleton)))
-            nudges[edge, way] = refine(one, fresh, everything, goal, weights)
-    if not nudges:
+    at = edges(known, motion.translated, span)
+    jump = jumps(motion, known, at)
+    size = np.linalg.norm(jump, axis=-1, keepdims=True)
+    excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
+    # Joints far below the limit may give way for those above it.
+    weights = np.where(size[..., 0] > 0.7 * limit, 1.0, 0.05)
+    # Each seam has a pose before and one after it; what is missing in both shares the work.
+    edge, way = np.repeat(at, 2), np.tile([-1, 1], len(at))
+    first = edge + way
+    shared = ~known.frames[edge - 1] & ~known.frames[edge + 1]
+    fresh = Observation(
+        known.rotation[first] | ~known.rotation[edge], known.translation[first] | ~known.translation[edge]
+    )
+    some = np.repeat(excess.any(axis=(1, 2)), 2) & ~fresh.frames
+    if not some.any():
         return motion
+    fresh = Observation(fresh.rotation[some], fresh.translation[some])
+    poses = motion.with_motion(motion.rotation[first[some]], motion.translation[first[some]])
+    goal = (
+        poses.positions()
+        - np.where(shared[some], 0.5, 1.0)[:, None, None] * np.repeat(excess, 2, axis=0)[some]
+    )
+    everything = tuple(range(len(motion.skeleton)))
+    nudged = refine(poses, fresh, everything, goal, np.repeat(weights, 2, axis=0)[some])
+    row = {(int(e), int(w)): i for i, (e, w) in enumerate(zip(edge[some], way[some]))}
 
     def measure(values: Values, slots: list[int], edge: int, way: int) -> Fade:
         none = np.zeros((len(slots), 3))
-        if (edge, way) not in nudges:
+        if (edge, way) not in row:
             return Fade(none, none)
-        at = edge + way
-        nudge = offset(values(motion)[at, slots], values(nudges[edge, way])[0, slots])
-        return Fade(none, nudge, at_first=True)
+        i = row[edge, way]
+        return Fade(none, offset(values(poses)[i, slots], values(nudged)[i, slots]), at_first=True)
 
     return _add(motion, known, span, measure)
 

@@ -21,7 +21,7 @@ NO_LENGTH = 0.01
 # How strongly a fit is pulled towards the pose it starts from, and how strongly bones count that reach over a
 # joint without length: only what the bones at the joint itself leave open should follow either.
 PULL, FAR = 1e-4, 1e-3
-# Sine of the bend below which a knee or elbow tells nothing of the twist above it, and from which it tells all.
+# Sine of the bend below which a knee or elbow tells nothing of the twist above it; from the second on, all.
 STRAIGHT, BENT = 0.1, 0.35
 # Gauss-Newton: steps, frames at once, and damping in square metres (a bone's length squared is about 0.1).
 STEPS, BLOCK, DAMPING = 3, 512, 2e-3
@@ -215,53 +215,59 @@ def refine(
     """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
-    this shares it out. Damping keeps what positions do not tell. `weights` (n,) says how much each position
+    this shares it out. Damping keeps what positions do not tell. `weights` (F, n) says how much each position
     counts; default: all the same.
     """
-    heavy = np.repeat(np.ones(len(joints)) if weights is None else weights, 3)
-    skeleton = clip.skeleton
-    movable = [j for j in sorted(joints) if any(j in skeleton.ancestors(k) for k in joints)]
+    heavy = 1.0 if weights is None else np.repeat(weights, 3, axis=1)[:, None]
+    skeleton, known = clip.skeleton, list(joints)
+    under = _under(skeleton)
+    movable = [j for j in sorted(joints) if under[known, j].any()]
     carriers = list(_carriers(skeleton, clip.translated, set(joints)))
-    above = np.array([[float(j in skeleton.ancestors(k)) for j in movable] for k in joints])
-    shifted = np.array([[float(c == k or c in skeleton.ancestors(k)) for c in carriers] for k in joints])
-    free = np.repeat(~observation.rotation[:, movable], 3, axis=1)
-    free_shift = np.repeat(~observation.translation[:, carriers], 3, axis=1)
-    free = np.concatenate([free, free_shift], axis=1).astype(float)
-    rotation, translation = clip.rotation.copy(), clip.translation.copy()
     slots = [clip.translated.index(c) for c in carriers]
+    above = under[np.ix_(known, movable)]
+    carried = (under + np.eye(len(skeleton)))[np.ix_(known, carriers)]
+    seen = [observation.rotation[:, movable], observation.translation[:, carriers]]
+    free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    frames, turns = len(clip), 3 * len(movable)
+    by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
+    by_shift = np.broadcast_to(by_shift, (frames, *by_shift.shape))
+
+    def to_parent(vectors: np.ndarray, of: list[int], turned: np.ndarray) -> np.ndarray:
+        """Vectors (F, n, 3) of the world in the axes of the parents of n joints."""
+        parents = np.array([skeleton.parents[j] for j in of])
+        inside = rotations.rotate(rotations.conjugate(turned[:, np.maximum(parents, 0)]), vectors)
+        return np.where(parents[:, None] >= 0, inside, vectors)
 
     for _ in range(STEPS):
         turned, placed = clip.with_motion(rotation, translation).kinematics()
-        lever = (placed[:, joints, None] - placed[:, None, movable]) * above[..., None]
+        lever = (placed[:, known, None] - placed[:, None, movable]) * above[..., None]
         x, y, z, o = lever[..., 0], lever[..., 1], lever[..., 2], np.zeros_like(lever[..., 0])
         # A small turn d about the axes of the world moves a point by d x lever: rows of that matrix.
-        by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], -2)
-        by_turn = np.moveaxis(by_turn, 2, 3).reshape(len(clip), 3 * len(joints), 3 * len(movable))
-        by_shift = np.einsum("kc,ab->kacb", shifted, np.eye(3)).reshape(3 * len(joints), 3 * len(carriers))
-        jacobian = np.concatenate([by_turn, np.broadcast_to(by_shift, (len(clip), *by_shift.shape))], axis=2)
-        jacobian *= free[:, None, :]
-        miss = (positions - placed[:, joints]).reshape(len(clip), -1)
-        transposed = np.swapaxes(jacobian, 1, 2)
-        transposed = transposed * heavy
+        by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], 2)
+        by_turn = by_turn.reshape(frames, 3 * len(known), turns)
+        jacobian = np.concatenate([by_turn, by_shift], axis=2) * free[:, None]
+        miss = (positions - placed[:, known]).reshape(frames, -1, 1)
+        transposed = np.swapaxes(jacobian, 1, 2) * heavy
         normal = transposed @ jacobian + DAMPING * np.eye(jacobian.shape[2])
-        step = np.linalg.solve(normal, transposed @ miss[..., None])[..., 0] * free
-        turn, shift = step[:, : 3 * len(movable)], step[:, 3 * len(movable) :]
-        # A turn d of the world's axes before a joint's own rotation is a turn in the axes of its parent.
-        for i, joint in enumerate(movable):
-            parent, d = skeleton.parents[joint], turn[:, 3 * i : 3 * i + 3]
-            if parent >= 0:
-                d = rotations.rotate(rotations.conjugate(turned[:, parent]), d)
-            rotation[:, joint] = np.where(
-                observation.rotation[:, joint, None],
-                rotation[:, joint],
-                rotations.normalize(rotations.multiply(rotations.exp(d), rotation[:, joint])),
-            )
-        for i, (carrier, slot) in enumerate(zip(carriers, slots)):
-            parent, d = skeleton.parents[carrier], shift[:, 3 * i : 3 * i + 3]
-            if parent >= 0:
-                d = rotations.rotate(rotations.conjugate(turned[:, parent]), d)
-            translation[:, slot] += d / skeleton.scale_above[carrier]
+        step = np.linalg.solve(normal, transposed @ miss)[..., 0] * free
+        # A turn in the world's axes before a joint's own rotation is one in its parent's axes.
+        turn = to_parent(step[:, :turns].reshape(frames, -1, 3), movable, turned)
+        done = rotations.normalize(rotations.multiply(rotations.exp(turn), rotation[:, movable]))
+        rotation[:, movable] = np.where(seen[0][..., None], rotation[:, movable], done)
+        shift = to_parent(step[:, turns:].reshape(frames, -1, 3), carriers, turned)
+        translation[:, slots] += shift / skeleton.scale_above[carriers][:, None]
     return clip.with_motion(rotation, translation)
+
+
+def _under(skeleton: Skeleton) -> np.ndarray:
+    """(J, J) 1 where the row's joint hangs below the column's."""
+    under = np.zeros((len(skeleton), len(skeleton)))
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            under[joint] = under[parent]
+            under[joint, parent] = 1.0
+    return under
 
 
 def solve_error(clip: Clip, joints: tuple[int, ...], positions: np.ndarray) -> np.ndarray:
