@@ -9,6 +9,7 @@ network run eagerly by torch on one thread, and how the time grows with the leng
 from __future__ import annotations
 
 import time
+from functools import partial
 
 import numpy as np
 
@@ -43,7 +44,7 @@ def main() -> None:
     print(f"ONNX Runtime, 1 thread: {FRAMES} frames in {ours:.3f} s, {1000 * ours / FRAMES:.3f} ms a frame")
     print(f"ratio to the paper's {PAPER} ms on a GPU: {1000 * ours / FRAMES / PAPER:.2f}")
     for frames in (100, 1_000, 10_000):
-        spent = timed(lambda: run(path, *motion(frames)), 3)
+        spent = timed(partial(run, path, *motion(frames)), 3)
         print(f"{frames:>7} frames: {1000 * spent / frames:.3f} ms a frame")
     try:
         import torch
@@ -57,7 +58,10 @@ def main() -> None:
     given = torch.from_numpy(positions).float(), torch.from_numpy(observed)
     with torch.no_grad():
         eager = timed(lambda: model(*given))
-    print(f"torch eager, 1 thread: {1000 * eager / FRAMES:.3f} ms a frame; ONNX Runtime takes {ours / eager:.2f} of it")
+    print(
+        f"torch eager, 1 thread: {1000 * eager / FRAMES:.3f} ms a frame; ONNX Runtime takes "
+        f"{ours / eager:.2f} of it"
+    )
 
 
 if __name__ == "__main__":

@@ -41,13 +41,15 @@ def long_walk(cmu_walk):  # type: ignore[no-untyped-def]
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_observed_comes_back_and_gaps_are_filled(cmu_walk, method):
     done = tasks.fill(cmu_walk, [Gap(60, 90), Gap(120, 130, ("LeftArm", "LeftForeArm"))], method)
-    assert _same(done.clip, cmu_walk, slice(0, 60)) and _same(done.clip, cmu_walk, slice(90, 120))
+    assert _same(done.clip, cmu_walk, slice(0, 60))
+    assert _same(done.clip, cmu_walk, slice(90, 120))
     arm = [cmu_walk.skeleton.index(name) for name in ("LeftArm", "LeftForeArm")]
     others = [j for j in range(len(cmu_walk.skeleton)) if j not in arm]
     assert np.array_equal(done.clip.rotation[120:130, others], cmu_walk.rotation[120:130, others])
     assert not np.array_equal(done.clip.rotation[60:90], cmu_walk.rotation[60:90])
     assert [gap.number for gap in done.report.gaps] == [1, 2]
-    assert (done.provenance[60:90] > 0).all() and not done.provenance[:60].any()
+    assert (done.provenance[60:90] > 0).all()
+    assert not done.provenance[:60].any()
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -86,7 +88,8 @@ def test_only_and_max_gap_leave_gaps_open(cmu_walk):
     assert [(g.start, g.stop) for g in done.report.open] == [(60, 100)]
     assert _same(done.clip, cmu_walk, slice(60, 100))
     done = tasks.fill(cmu_walk, gaps, "linear", only=[3])
-    assert [g.number for g in done.report.gaps] == [3] and len(done.report.open) == 2
+    assert [g.number for g in done.report.gaps] == [3]
+    assert len(done.report.open) == 2
     with pytest.raises(RequestError, match="no gap number 4"):
         tasks.fill(cmu_walk, gaps, "linear", only=[4])
 
@@ -121,7 +124,8 @@ def test_unknown_humanoid_is_refused_with_the_reason(cmu_walk):
     names = tuple(f"bone{j}" for j in range(len(cmu_walk.skeleton)))
     strange = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, names=names), source=None)
     report = tasks.fill(strange, [Gap(60, 90)], "cae").report.gaps[0]
-    assert report.method == "spline" and "no joints for Hips" in " ".join(report.notes)
+    assert report.method == "spline"
+    assert "no joints for Hips" in " ".join(report.notes)
 
 
 @pytest.mark.parametrize("fps", [24, 25, 60, 120])
@@ -131,7 +135,8 @@ def test_frame_rates(cmu_walk, fps):
     start, stop = round(2 * fps), round(3 * fps)
     done = tasks.fill(clip, [Gap(start, stop)], "cae")
     assert done.report.gaps[0].method == "cae", done.report
-    assert _same(done.clip, clip, slice(0, start)) and _same(done.clip, clip, slice(stop, None))
+    assert _same(done.clip, clip, slice(0, start))
+    assert _same(done.clip, clip, slice(stop, None))
     here = tasks.fill(cmu_walk, [Gap(60, 90)], "cae").clip.positions()[75]
     there = done.clip.positions()[round(2.5 * fps)]
     assert np.linalg.norm(here - there, axis=-1).mean() < 0.05
@@ -153,7 +158,8 @@ def test_frame_rates(cmu_walk, fps):
 def test_odd_clips(cmu_walk, method, frames, gaps):
     clip = cmu_walk.slice(0, frames)
     done = tasks.fill(clip, gaps, method)
-    assert np.isfinite(done.clip.rotation).all() and np.isfinite(done.clip.translation).all()
+    assert np.isfinite(done.clip.rotation).all()
+    assert np.isfinite(done.clip.translation).all()
     assert np.allclose(np.linalg.norm(done.clip.rotation, axis=-1), 1)
     seen = Observation.from_gaps(clip, gaps)
     assert np.array_equal(done.clip.rotation[seen.rotation], clip.rotation[seen.rotation])
@@ -181,7 +187,9 @@ def test_joints_lost_for_long_are_recovered_in_pieces_that_agree(long_walk):
 def test_progress_goes_up_to_one(long_walk):
     shares: list[float] = []
     tasks.fill(long_walk, [Gap(100, 110), Gap(300, 310), Gap(500, 510)], "linear", progress=shares.append)
-    assert shares == sorted(shares) and shares[-1] == 1 and len(shares) == 3
+    assert shares == sorted(shares)
+    assert shares[-1] == 1
+    assert len(shares) == 3
 
 
 def test_an_observation_says_the_same_as_its_gaps(cmu_walk):
@@ -211,7 +219,7 @@ def test_half_an_hour_takes_less_than_a_gigabyte(data):
         walk = load({str(data / "cmu_walk.bvh")!r})
         there = np.arange(len(walk))
         frames = np.resize(np.concatenate([there, there[::-1]]), 54_000)
-        clip = replace(walk, rotation=walk.rotation[frames], translation=walk.translation[frames], source=None)
+        clip = replace(walk.slice(0, 1), rotation=walk.rotation[frames], translation=walk.translation[frames])
         tasks.fill(clip, [Gap(30_000, 30_040), Gap(40_000, 40_005)], "cae")
         tasks.fill(clip, [Gap(1_000, 1_030)], "spline")
         print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)

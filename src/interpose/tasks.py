@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -190,45 +191,41 @@ def _shifted(
 
 
 def _joined(reports: list[GapReport]) -> list[GapReport]:
-    """One report for a gap that was completed in pieces: the worst of its seams and bones, means of the rest."""
+    """One report for a gap that was completed in pieces: the worst seam and bone, means of the rest."""
     done: list[GapReport] = []
     for one in reports:
         last = done[-1] if done else None
         if last is None or (last.number, last.joints, last.method) != (one.number, one.joints, one.method):
             done.append(one)
             continue
-        share = (one.stop - last.stop) / max(one.stop - last.start, 1)
-        done[-1] = replace(
-            last,
-            stop=one.stop,
-            seam_before=_over(max, last.seam_before, one.seam_before),
-            seam_after=_over(max, last.seam_after, one.seam_after),
-            bone_deviation=max(last.bone_deviation, one.bone_deviation),
-            solve_error=_over(lambda a, b: a + share * (b - a), last.solve_error, one.solve_error),
-            foot_slide=_over(lambda a, b: a + share * (b - a), last.foot_slide, one.foot_slide),
-            foot_slide_before=_over(
-                lambda a, b: a + share * (b - a), last.foot_slide_before, one.foot_slide_before
-            ),
-            foot_travel=_over(lambda a, b: a + b, last.foot_travel, one.foot_travel),
-            notes=tuple(dict.fromkeys(last.notes + one.notes)),
-        )
+        # Of all frames so far, those that the new piece added.
+        share = (one.stop - last.stop) / (one.stop - last.start)
+        worst = {
+            name: _over(last, one, name, max) for name in ("seam_before", "seam_after", "bone_deviation")
+        }
+        means = {
+            name: _over(last, one, name, lambda a, b, share=share: a + share * (b - a))
+            for name in ("solve_error", "foot_slide", "foot_slide_before")
+        }
+        travel = _over(last, one, "foot_travel", lambda a, b: a + b)
+        notes = tuple(dict.fromkeys(last.notes + one.notes))
+        done[-1] = replace(last, stop=one.stop, foot_travel=travel, notes=notes, **worst, **means)
     return done
 
 
-def _over(
-    combine: Callable[[float, float], float], one: float | None, other: float | None
-) -> float | None:
-    """Two measures combined; where only one was taken, that."""
-    if one is None or other is None:
-        return other if one is None else one
-    return combine(one, other)
+def _over(one: GapReport, other: GapReport, name: str, combine: Callable[..., float]) -> Any:
+    """A measure of two reports combined; where only one has it, that one's."""
+    a, b = getattr(one, name), getattr(other, name)
+    return combine(a, b) if a is not None and b is not None else b if a is None else a
 
 
 class _RawClip:
     """What the methods themselves said, put together for the whole clip."""
 
     def __init__(self, clip: Clip) -> None:
-        self.clip = replace(clip, rotation=clip.rotation.copy(), translation=clip.translation.copy(), source=None)
+        self.clip = replace(
+            clip, rotation=clip.rotation.copy(), translation=clip.translation.copy(), source=None
+        )
         self.positions: np.ndarray | None = None
         self.joints: tuple[int, ...] = ()
 

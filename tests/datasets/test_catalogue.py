@@ -37,21 +37,29 @@ def published(tmp_path, data):  # type: ignore[no-untyped-def]
 
 
 def test_splits_of_the_data_sets():
-    assert split_of("lafan1", "subject5") == "test" and split_of("lafan1", "subject4") == "validation"
+    assert split_of("lafan1", "subject5") == "test"
+    assert split_of("lafan1", "subject4") == "validation"
     assert split_of("lafan1", "subject1") == "train"
-    assert split_of("bandai", "dataset-2/masculine") == "test" and split_of("bandai", "dataset-1/normal") == "train"
+    assert split_of("bandai", "dataset-2/masculine") == "test"
+    assert split_of("bandai", "dataset-1/normal") == "train"
     assert {split_of("cmu", subject) for subject in ("16", "49")} == {"test"}
-    assert split_of("cmu", "08") == "validation" and split_of("hdm05", "tr") == "test"
+    assert split_of("cmu", "08") == "validation"
+    assert split_of("hdm05", "tr") == "test"
 
 
 def test_entries_know_performer_label_and_split(published):
     found = {entry.path.stem: entry for entry in clips("lafan1", published)}
-    assert found["jumps1_subject5"].split == "test" and found["jumps1_subject5"].label == "jumps"
+    assert found["jumps1_subject5"].split == "test"
+    assert found["jumps1_subject5"].label == "jumps"
     assert found["run1_subject4"].split == "validation"
     assert found["dance2_subject4_turn"].split == "train", "cuts only train"
     assert "dance2_subject5_turn" not in found, "but nothing of a test performer trains"
     styles = {entry.performer: entry.split for entry in clips("bandai", published)}
-    assert styles == {"dataset-1/normal": "train", "dataset-2/normal": "test", "dataset-2/youthful": "validation"}
+    assert styles == {
+        "dataset-1/normal": "train",
+        "dataset-2/normal": "test",
+        "dataset-2/youthful": "validation",
+    }
 
 
 def test_cmu_loses_its_rest_pose(published):
@@ -61,7 +69,8 @@ def test_cmu_loses_its_rest_pose(published):
 
 def test_pack_holds_positions_and_no_test_performer(published, tmp_path):
     pack = build_pack("cmu", published)
-    assert set(pack.performers) == {"02", "08"} and "test" not in pack.splits
+    assert set(pack.performers) == {"02", "08"}
+    assert "test" not in pack.splits
     pack.save(tmp_path / "cmu.npz")
     again = Pack.load(tmp_path / "cmu.npz")
     clip = clips("cmu", published, "train")[0].load()

@@ -102,7 +102,7 @@ def test_drift_is_spread_smoothly_and_gone_at_the_end(walk, gap):
     rows = image.rows.clone()
     rows[:, 66] += 0.004
     rows[:, 68] += 0.01
-    root, yaw, fixed, straight = integrate(rows, image)
+    root, _yaw, fixed, straight = integrate(rows, image)
     drift = (root - image.root).norm(dim=-1)[0]
     assert drift[79] > 0.1
     step = image.root[0, 80] - fixed[0, 79]

@@ -38,7 +38,9 @@ def pack(cmu_walk):  # type: ignore[no-untyped-def]
     )
 
 
-@pytest.mark.parametrize(("text", "seconds", "steps"), [("90s", 90, None), ("25m", 1500, None), ("12steps", None, 12)])
+@pytest.mark.parametrize(
+    ("text", "seconds", "steps"), [("90s", 90, None), ("25m", 1500, None), ("12steps", None, 12)]
+)
 def test_budgets(text, seconds, steps):
     budget = Budget.parse(text)
     assert (budget.seconds, budget.steps) == (seconds, steps)
@@ -53,7 +55,8 @@ def test_budgets_that_are_none(text):
 def test_curriculum_of_the_paper():
     """At 30 fps: 5 frames at first, never shorter again, 60 from epoch 69 of 200 on, in steps of 5."""
     means = [curriculum_mean(CaeSettings(), f) for f in np.linspace(0, 1, 400)]
-    assert means[0] == 5 and means[-1] == 60
+    assert means[0] == 5
+    assert means[-1] == 60
     assert all(a <= b for a, b in zip(means, means[1:]))
     assert sorted(set(np.round(means, 6))) == list(range(5, 65, 5))
     assert curriculum_mean(CaeSettings(), 0.34) < 60 == curriculum_mean(CaeSettings(), 0.346)
@@ -89,7 +92,8 @@ def test_training_moves_all_weights_writes_a_log_and_goes_on(pack, tmp_path):
     train_cae([pack], tmp_path, Budget.parse("3steps"), settings, say=lines.append)
     model = train_cae([pack], tmp_path, Budget.parse("6steps"), settings, say=lines.append)
     log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
-    assert log[-1]["step"] == 6 and log[-1]["fraction"] == 1
+    assert log[-1]["step"] == 6
+    assert log[-1]["fraction"] == 1
     assert any("goes on at 50 %" in line for line in lines)
     torch.manual_seed(settings.seed)
     start = Infiller().network.state_dict()

@@ -1,4 +1,4 @@
-"""The public data sets: where their clips are, who performs, which split they belong to, and packs of them."""
+"""The public data sets: where their clips are, who performs, their splits, and packs of them."""
 
 from interpose.datasets.catalogue import DATASETS, Entry, clips, split_of
 from interpose.datasets.pack import Pack, build_pack

@@ -42,11 +42,11 @@ class Entry:
 
 @cache
 def _splits() -> dict[str, dict[str, list[str]]]:
-    return json.loads((files("interpose.datasets") / "splits.json").read_text())  # type: ignore[no-any-return]
+    return json.loads((files("interpose.datasets") / "splits.json").read_text())
 
 
 def split_of(dataset: str, performer: str) -> str:
-    """"train", "validation" or "test"."""
+    """ "train", "validation" or "test"."""
     for split in ("test", "validation"):
         if performer in _splits()[dataset][split]:
             return split
@@ -60,7 +60,9 @@ def _lafan1(folder: Path) -> list[Entry]:
             match = re.fullmatch(r"([A-Za-z]+)\d+_(subject\d)(_.*)?", path.stem)
             if match:
                 found.append(Entry("lafan1", path, match[2], match[1], trains_only=part == "cuts"))
-    return [entry for entry in found if not (entry.trains_only and split_of("lafan1", entry.performer) == "test")]
+    return [
+        entry for entry in found if not (entry.trains_only and split_of("lafan1", entry.performer) == "test")
+    ]
 
 
 def _bandai(folder: Path) -> list[Entry]:

@@ -104,7 +104,7 @@ class Infilling:
         }
 
     def table(self, group: str = "all") -> str:
-        """A Markdown table: error in cm with its standard deviation, and the ratio to the paper's linear row."""
+        """A Markdown table: mean error in cm, its deviation, and the ratio to the paper's linear row."""
         head = ["", *(f"{frames} frames" for frames in GAPS)]
         lines = [head, ["---"] + ["---:"] * len(GAPS)]
         for row in ROWS:
@@ -119,18 +119,25 @@ class Infilling:
     def feet_table(self) -> str:
         """A Markdown table of foot slide and travel in the gap, next to the truth's."""
         frames = [gap for gap in GAPS if gap]
-        lines = [["feet: slide cm/s, travel m", *(f"{gap} frames" for gap in frames)], ["---"] + ["---:"] * len(frames)]
+        lines = [
+            ["feet: slide cm/s, travel m", *(f"{gap} frames" for gap in frames)],
+            ["---"] + ["---:"] * len(frames),
+        ]
         for row in self.feet:
             figures = [self.foot(row, gap) for gap in frames]
             lines.append([row, *(f"{slide:.1f}, {travel:.2f}" for slide, travel in figures)])
         return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def __str__(self) -> str:
-        parts = [f"{group} ({self.counts[group]} windows, {self.split})\n\n{self.table(group)}" for group in self.errors]
+        parts = [
+            f"{group} ({self.counts[group]} windows, {self.split})\n\n{self.table(group)}"
+            for group in self.errors
+        ]
         drift = ", ".join(f"{np.mean(held):.1f} cm at {gap}" for gap, held in self.drifts.items())
         notes = [
             "Mean ± standard deviation of the joint error in cm (ratio to the paper's linear row).",
-            f"Solve: {np.mean(self.solves):.2f} cm from the network's positions. Root drift before correction: {drift}.",
+            f"Solve: {np.mean(self.solves):.2f} cm from the network's positions.",
+            f"Root drift before correction: {drift}.",
             f"Fell back to the spline: {dict(self.fallen) or 'never'}.",
         ]
         return "\n\n".join([*parts, self.feet_table(), "\n".join(notes)])
@@ -205,9 +212,7 @@ def _linear(positions: np.ndarray, gap: Gap) -> np.ndarray:
     return filled
 
 
-def _feet(
-    result: Infilling, window: Window, clip: Any, hidden: Observation, gap: Gap, row: str
-) -> None:
+def _feet(result: Infilling, window: Window, clip: Any, hidden: Observation, gap: Gap, row: str) -> None:
     measured = measure(clip, hidden, gap.start, gap.stop)
     if measured:
         result.feet[row][len(gap)].append(measured)

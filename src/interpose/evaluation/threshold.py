@@ -55,7 +55,8 @@ class Threshold:
             lines.append([str(gap), *(f"{self.errors[name][i]:.2f}" for name in METHODS)])
         table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
         return (
-            f"{table}\n\nMean joint error in cm of finished fills, {self.count} windows of validation performers.\n"
+            f"{table}\n\nMean joint error in cm of finished fills, {self.count} windows of validation "
+            "performers.\n"
             f"The network is better from {self.from_gap} frames on."
         )
 

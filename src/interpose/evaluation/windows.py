@@ -71,7 +71,9 @@ def windows(
         most: windows per data set, spread evenly over all of them; None for all.
     """
     if split not in SPLITS:
-        raise RequestError(f"unknown split: {split}", f"it is none of: {', '.join(SPLITS)}", "Choose one of these.")
+        raise RequestError(
+            f"unknown split: {split}", f"it is none of: {', '.join(SPLITS)}", "Choose one of these."
+        )
     for dataset in datasets:
         entries = clips(dataset, data, split)
         progress(f"{dataset}: reading {len(entries)} clips")

@@ -1,4 +1,4 @@
-"""The convolutional autoencoder (Kaufmann et al. 2020) as a method: from a clip to its ONNX graph and back."""
+"""The convolutional autoencoder (Kaufmann et al. 2020) as a method: from a clip to the graph and back."""
 
 from __future__ import annotations
 
@@ -69,10 +69,13 @@ class Cae:
             missing = ", ".join(mapping.missing)
             return f"the skeleton has no joints for {missing} (known by their names)"
         if gap.joints is not None and not self._moves(mapping, gap.joints):
-            return "nothing that the network knows hangs below these joints, so positions do not tell their rotation"
+            return (
+                "no joint that the network knows hangs below these, so positions do not tell their rotation"
+            )
         length = len(gap) * self.card.fps / clip.fps
         if gap.joints is None and length > self.card.max_gap:
-            return f"{length:.0f} frames at {self.card.fps:g} fps are more than the {self.card.max_gap} it can fill"
+            at = f"{length:.0f} frames at {self.card.fps:g} fps"
+            return f"{at} are more than the {self.card.max_gap} it can fill"
         return None
 
     @staticmethod
@@ -80,7 +83,9 @@ class Cae:
         """Whether any mapped joint lies below one of these joints, or a root is among them."""
         skeleton = mapping.skeleton
         lost = {skeleton.index(name) for name in names}
-        below = {parent for joint in mapping.joints if joint is not None for parent in skeleton.ancestors(joint)}
+        below = {
+            parent for joint in mapping.joints if joint is not None for parent in skeleton.ancestors(joint)
+        }
         return bool(lost & below)
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
@@ -103,7 +108,12 @@ class Cae:
         return Raw(base, spoken[:, canonical], joints, {"model": card.name, "drift": drift})
 
     def _drift(
-        self, observation: Observation, raw: np.ndarray, completed: np.ndarray, times: np.ndarray, mapping: Mapping
+        self,
+        observation: Observation,
+        raw: np.ndarray,
+        completed: np.ndarray,
+        times: np.ndarray,
+        mapping: Mapping,
     ) -> dict[str, float]:
         """Metres by which the root had drifted at the end of each gap, before it was corrected."""
         off = np.linalg.norm((raw - completed)[:, 0], axis=-1) / mapping.scale

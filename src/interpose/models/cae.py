@@ -48,11 +48,11 @@ class Autoencoder(nn.Module):
     def forward(self, image: Tensor) -> Tensor:
         sizes = []
         x = image
-        for first, second in self.encoder:  # type: ignore[misc]
+        for first, second in self.encoder:
             x = functional.leaky_relu(second(functional.leaky_relu(first(x))))
             sizes.append(x.shape[-2:])
             x = functional.max_pool2d(x, 2, ceil_mode=True)
-        for i, (first, second) in enumerate(self.decoder):  # type: ignore[misc]
+        for i, (first, second) in enumerate(self.decoder):
             x = second(functional.leaky_relu(first(x, output_size=sizes[-1 - i])))
             if i < len(self.decoder) - 1:
                 x = functional.leaky_relu(x)
@@ -100,7 +100,8 @@ def to_image(positions: Tensor, observed: Tensor) -> Image:
     moved = torch.cat([torch.zeros_like(placed[:, :1]), placed[:, 1:] & placed[:, :-1]], dim=1)
     rows = torch.cat([body.flatten(2), moves], dim=2)
     known = torch.cat(
-        [(observed & placed[..., None]).repeat_interleave(3, dim=2), moved[..., None].expand(-1, -1, 3)], dim=2
+        [(observed & placed[..., None]).repeat_interleave(3, dim=2), moved[..., None].expand(-1, -1, 3)],
+        dim=2,
     )
     return Image(rows.transpose(1, 2), known.transpose(1, 2), floor, root, yaw, placed)
 
@@ -189,7 +190,7 @@ class Infiller(nn.Module):
     def predict(self, image: Image) -> Tensor:
         """Normalised rows (B, 69, T), the network's answer to what is known; masked values are 0."""
         masked = torch.where(image.known, (image.rows - self.mean) / self.std, 0.0)
-        return self.network(masked[:, None])[:, 0]  # type: ignore[no-any-return]
+        return self.network(masked[:, None])[:, 0]
 
     def forward(self, positions: Tensor, observed: Tensor) -> tuple[Tensor, Tensor]:
         """Complete a motion.

@@ -15,7 +15,7 @@ from torch import Tensor, nn
 
 from interpose.datasets import Pack
 from interpose.geometry.ground import wrap
-from interpose.models.cae import Infiller, to_image
+from interpose.models.cae import Image, Infiller, to_image
 from interpose.observation.corruption import gap_mask, joints_mask
 from interpose.skeletons import JOINTS
 from interpose.training.budget import Budget
@@ -47,7 +47,7 @@ def curriculum_mean(settings: CaeSettings, fraction: float) -> float:
 
 
 def corrupt(rng: np.random.Generator, settings: CaeSettings, fraction: float, batch: int) -> np.ndarray:
-    """What is observed (B, T, 22): a gap in most clips, 1, then up to 2, then up to 3 joints lost in others."""
+    """What is observed (B, T, 22): a gap in most clips, in others 1, later up to 2 and 3 joints lost."""
     shape = (batch, settings.length, len(JOINTS))
     gaps = gap_mask(rng, *shape, curriculum_mean(settings, fraction), settings.sigma)
     joints = joints_mask(rng, *shape, most=1 + int(min(2, fraction * 3)))
@@ -84,7 +84,7 @@ def train_cae(
     windows = Windows(packs, splits, settings.length, device)
     held_out = Windows(packs, ("validation",), settings.length, device).spread(96)
     model = Infiller().to(device)
-    model.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    model.network.to(memory_format=torch.channels_last)
     fit_normaliser(model, windows, rng)
     if device.type == "cpu":
         quicken(model)
@@ -99,11 +99,13 @@ def train_cae(
             answer = model.predict(image)
         return (answer.float() - (image.rows - model.mean) / model.std).abs().mean()
 
-    trainer = Trainer(model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say)
+    trainer = Trainer(
+        model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say
+    )
     say(f"{windows.frames:,} frames of {', '.join(splits)}, on {device}")
     if trainer.resume():
         say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
-    return trainer.run()  # type: ignore[return-value]
+    return trainer.run()
 
 
 @torch.no_grad()
@@ -117,9 +119,10 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
         observed = torch.ones(positions.shape[:-1], dtype=torch.bool, device=positions.device)
         observed[:, start : start + gap] = False
         image = to_image(positions, observed)
-        rows = torch.cat(
-            [model.predict(_part(image, at)) for at in range(0, len(positions), 32)]
-        ) * model.std + model.mean
+        rows = (
+            torch.cat([model.predict(_part(image, at)) for at in range(0, len(positions), 32)]) * model.std
+            + model.mean
+        )
         wrong = (rows - image.rows)[:, 3:66, start : start + gap].unflatten(1, (-1, 3)).norm(dim=2)
         share = torch.arange(1, gap + 1, device=positions.device)[:, None, None] / (gap + 1)
         ends = positions[:, [start - 1]], positions[:, [start + gap]]
@@ -130,5 +133,6 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
     return figures
 
 
-def _part(image, start: int):  # type: ignore[no-untyped-def]
-    return type(image)(**{name: value[start : start + 32] for name, value in vars(image).items()})
+def _part(image: Image, start: int) -> Image:
+    """32 clips of a batch, from `start` on."""
+    return Image(**{name: value[start : start + 32] for name, value in vars(image).items()})

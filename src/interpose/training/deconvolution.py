@@ -25,16 +25,16 @@ class _Deconvolution(torch.autograd.Function):
     """A 3x3 deconvolution with padding 1, without bias."""
 
     @staticmethod
-    @torch.amp.custom_fwd(device_type="cpu", cast_inputs=torch.bfloat16)  # type: ignore[untyped-decorator]
+    @torch.amp.custom_fwd(device_type="cpu", cast_inputs=torch.bfloat16)
     def forward(ctx: Any, x: Tensor, weight: Tensor, stride: int, size: list[int]) -> Tensor:
         ctx.save_for_backward(x, weight)
         ctx.stride = stride
         like = torch.empty((len(x), weight.shape[1], *size), dtype=x.dtype)
         like = like.to(memory_format=torch.channels_last)
-        return _gradients(x, like, weight, stride, [True, False, False])[0]  # type: ignore[no-any-return]
+        return _gradients(x, like, weight, stride, [True, False, False])[0]
 
     @staticmethod
-    @torch.amp.custom_bwd(device_type="cpu")  # type: ignore[untyped-decorator]
+    @torch.amp.custom_bwd(device_type="cpu")
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor, Tensor, None, None]:
         x, weight = ctx.saved_tensors
         (gradient,) = gradients
@@ -50,6 +50,6 @@ def quicken(model: nn.Module) -> None:
             def forward(x: Tensor, output_size: list[int], module: nn.ConvTranspose2d = module) -> Tensor:
                 assert module.bias is not None
                 y = _Deconvolution.apply(x, module.weight, 2, output_size)
-                return y + module.bias.to(y.dtype)[:, None, None]  # type: ignore[no-any-return]
+                return y + module.bias.to(y.dtype)[:, None, None]
 
-            module.forward = forward  # type: ignore[method-assign,assignment]
+            module.forward = forward

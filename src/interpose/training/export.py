@@ -36,7 +36,10 @@ def export_onnx(model: Infiller, path: Path) -> None:
     Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits.
     """
     positions, observed = torch.randn(2, 64, len(JOINTS), 3), torch.rand(2, 64, len(JOINTS)) > 0.2
-    sizes = {0: torch.export.Dim("clips", min=1, max=4096), 1: 32 * torch.export.Dim("blocks", min=1, max=8192)}
+    sizes = {
+        0: torch.export.Dim("clips", min=1, max=4096),
+        1: 32 * torch.export.Dim("blocks", min=1, max=8192),
+    }
     program = torch.onnx.export(
         model.eval().cpu(),
         (positions, observed),
@@ -67,7 +70,9 @@ def _halve(model: onnx.ModelProto) -> None:
         model.graph.node.insert(0, cast)
 
 
-def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, Any], splits: list[str]) -> Card:
+def export_cae(
+    folder: Path, packs: list[Pack], out: Path, settings: dict[str, Any], splits: list[str]
+) -> Card:
     """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder."""
     model = Infiller()
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
@@ -75,19 +80,16 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, A
     export_onnx(model, out / "cae.onnx")
     log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
-    hours = np.array([entry["hours"] for entry in log])
+    hours = [entry["hours"] for entry in log]
     line_plot(
-        {"loss": (hours, np.array([entry["loss"] for entry in log]))},
+        {"loss": (hours, [entry["loss"] for entry in log])},
         "device hours",
         "L1, normalised",
         "Training of cae",
         path=out / "loss.svg",
     )
     line_plot(
-        {
-            f"gap of {gap} frames": (hours, np.array([entry[f"gap{gap}"] for entry in log]))
-            for gap in (15, 30, 60)
-        },
+        {f"gap of {gap} frames": (hours, [entry[f"gap{gap}"] for entry in log]) for gap in (15, 30, 60)},
         "device hours",
         "joint error, cm",
         "Validation performers",
@@ -98,7 +100,12 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, A
         kept = np.isin(pack.splits, splits)
         frames = int(np.diff(pack.starts)[kept].sum())
         data.append(
-            {"name": str(pack.dataset), "licence": LICENCES[pack.dataset], "clips": int(kept.sum()), "frames": frames}
+            {
+                "name": str(pack.dataset),
+                "licence": LICENCES[pack.dataset],
+                "clips": int(kept.sum()),
+                "frames": frames,
+            }
         )
     card = Card(
         name="cae",
@@ -134,6 +141,8 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, settings: dict[str, A
 def _commit() -> str:
     try:
         asked = ["git", "rev-parse", "--short", "HEAD"]
-        return subprocess.run(asked, capture_output=True, text=True, check=True, cwd=Path(__file__).parent).stdout.strip()
+        return subprocess.run(
+            asked, capture_output=True, text=True, check=True, cwd=Path(__file__).parent
+        ).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return "unknown"

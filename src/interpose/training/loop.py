@@ -14,7 +14,8 @@ from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor, distributed as dist, nn
+from torch import Tensor, nn
+from torch import distributed as dist
 
 from interpose.errors import FileError
 from interpose.training.budget import Budget
@@ -141,7 +142,9 @@ class Trainer:
             losses.append(loss.detach())
             with torch.no_grad():
                 # Early on the average follows closely, so that it never carries the random start along.
-                keep = min(self.settings.average, (1 + self.budget.spent_steps) / (10 + self.budget.spent_steps))
+                keep = min(
+                    self.settings.average, (1 + self.budget.spent_steps) / (10 + self.budget.spent_steps)
+                )
                 for mean, now in zip(self.averaged.parameters(), self.model.parameters()):
                     mean.lerp_(now, 1 - keep)
                 for mean, now in zip(self.averaged.buffers(), self.model.buffers()):

@@ -23,7 +23,9 @@ class Windows:
     the window repeat their last pose, as in Kaufmann et al. 2020.
     """
 
-    def __init__(self, packs: Sequence[Pack], splits: Sequence[str], length: int, device: torch.device) -> None:
+    def __init__(
+        self, packs: Sequence[Pack], splits: Sequence[str], length: int, device: torch.device
+    ) -> None:
         offset, hips, counts = [], [], []
         for pack in packs:
             for clip in range(len(pack.names)):
