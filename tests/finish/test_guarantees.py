@@ -221,12 +221,9 @@ def test_same_input_same_bytes(walk, make):
     assert json.dumps(once.report.to_dict()) == json.dumps(again.report.to_dict())
 
 
-@pytest.mark.parametrize("frames", [1, 2])
-@pytest.mark.parametrize("gap", [(0, 1), (1, 2), (0, 2)])
+@pytest.mark.parametrize(("frames", "gap"), [(1, (0, 1)), (2, (0, 1)), (2, (1, 2)), (2, (0, 2))])
 def test_clips_of_one_and_two_frames(walk, make, frames, gap):
     short = walk.slice(0, frames)
-    if gap[1] > frames:
-        pytest.skip("no such frame")
     known = gaps_of(short, gap)
     done = complete(short, known, make(short))
     assert len(done.clip) == frames

@@ -126,7 +126,7 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     skeleton = clip.skeleton
     start, stop = span
     joints = [[leg.thigh, leg.knee, leg.ankle] for leg in legs(skeleton)]
-    free = [(~known.rotation[:, chain]).all(axis=1) for chain in joints]
+    free = [np.asarray((~known.rotation[:, chain]).all(axis=1)) for chain in joints]
     if not any(f[start:stop].any() for f in free):
         return clip
     rotation = clip.rotation.copy()

@@ -132,8 +132,8 @@ def complete(
         settle(failed, second)
         for span in failed:
             # Where the simpler method is no better at the seams, there is no reason to lose the motion.
-            jump, theirs = _seams(own, known, span) or 0.0, _seams(current, known, span) or 0.0
-            if not span.hopeless and theirs > max(limit or 0.0, jump):
+            jump, other = _seams(own, known, span) or 0.0, _seams(current, known, span) or 0.0
+            if not span.hopeless and other > max(limit or 0.0, jump):
                 _write(current, own, span.start, (span.start, span.stop))
                 continue
             span.method = fallback.name
