@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish import measures
@@ -18,12 +19,18 @@ from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_mapping
 
 # A contact is slower than the first speed (metres a second) somewhere and nowhere faster than the second; it
-# is no higher above the floor than HIGH and lasts at least SHORT seconds.
-SLOW, FAST, HIGH, SHORT = 0.30, 0.50, 0.04, 0.10
+# is no higher above the floor than HIGH and lasts at least SHORT seconds. What moves further than STEP in it is no
+# stance that slides but a low step. The speeds are those of networks, whose stances slide; stances of real feet
+# are ten times slower.
+SLOW, FAST, HIGH, SHORT, STEP = 0.80, 1.40, 0.06, 0.10, 0.50
+# An observed stance is slower than this (metres a second), and no higher than this above the lowest one.
+STILL, LEVEL = 0.30, 0.08
 # Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam.
 BLEND = 0.15
 # A foot may sink this far (metres) below the lowest stances nearby; the bound is rounded off over as much.
 SINK = 0.005
+# Metres by which a foot clears the floor once it is twice as fast as FAST, and seconds over which it is lifted.
+CLEAR, SOFT = 0.03, 0.07
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -62,7 +69,7 @@ def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndar
     """
     frames, count = positions.shape[:2]
     floor = np.empty((frames, count))
-    slow = measures.speed(positions, fps) < SLOW
+    slow = measures.speed(positions, fps) < STILL
     near = max(1, round(NEARBY * fps))
     for joint in range(count):
         heights, seen = positions[:, joint, 1], known[:, joint]
@@ -76,7 +83,7 @@ def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndar
             for side, frames_there in ((part[0], part[:near]), (part[-1], part[-near:])):
                 still = frames_there[slow[frames_there, joint]]
                 lowest = heights[frames_there].min()
-                still = still[heights[still] < lowest + 2 * HIGH]
+                still = still[heights[still] < lowest + LEVEL]
                 at.append(side)
                 height.append(np.percentile(heights[still if len(still) else frames_there], 10))
         floor[:, joint] = np.interp(np.arange(frames), at, height)
@@ -91,7 +98,8 @@ def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray
     planted = np.zeros_like(low)
     for joint in range(low.shape[1]):
         for start, stop in runs(possible[:, joint]):
-            if certain[start:stop, joint].any() and stop - start >= SHORT * fps:
+            moved = np.linalg.norm(np.ptp(positions[start:stop, joint][:, [0, 2]], axis=0))
+            if certain[start:stop, joint].any() and stop - start >= SHORT * fps and moved < STEP:
                 planted[start:stop, joint] = True
     return planted
 
@@ -141,9 +149,11 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         feet = placed[:, [leg.ankle, leg.toe]]
         floor = local_floor(feet, seen[:, [leg.ankle, leg.toe]], clip.fps)
         planted = contacts(feet, floor, clip.fps)
-        shift = _hold(feet, planted, movable, clip.fps)
-        shift[..., 1] += _lift((floor - SINK - feet[..., 1] - shift[..., 1]).max(axis=1))[:, None]
-        shift *= _envelope(movable, clip.fps)[:, None, None]
+        tied, shift = _hold(feet, planted, movable, clip.fps)
+        speeds = measures.speed(feet + tied + shift, clip.fps)
+        lowest = floor - SINK + CLEAR * ramp((speeds - FAST) / FAST)
+        shift[..., 1] += _smooth(_lift((lowest - feet[..., 1]).max(axis=1)), clip.fps)[:, None]
+        shift = tied + shift * _envelope(movable, clip.fps)[:, None, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = _reach(
@@ -152,17 +162,20 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     return clip.with_motion(rotation, clip.translation)
 
 
-def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float) -> np.ndarray:
-    """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
+def _hold(
+    feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two horizontal shifts (F, 2, 3) of ankle and toe that, added up, hold each of them during its contacts.
 
     feet: (F, 2, 3); planted: (F, 2). A contact that goes on in observed frames is held where it is at the
-    seam (between the two places, when it does so at both ends), any other one at its mean. Outside of a
-    contact the shift fades; where only one of the two is held, the other moves with it.
+    seam (between the two places, when it does so at both ends): these shifts come first, and are nothing at
+    the seam by themselves. Any other contact is held at its mean. Outside of a contact a shift fades; where
+    only one of the two joints is held, the other moves with it.
     """
     frames = len(feet)
     blend = max(2, round(BLEND * fps))
     time = np.arange(frames)
-    shifts, shares = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
+    shifts, shares = np.zeros((2, frames, 2, 3)), np.zeros((frames, 2))
     for joint in range(2):
         held = [run for run in runs(planted[:, joint]) if movable[slice(*run)].any()]
         for k, (start, stop) in enumerate(held):
@@ -170,9 +183,9 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
             first, last = inside[0], inside[-1]
             before = feet[first - 1, joint] if first > start else None
             after = feet[last + 1, joint] if last < stop - 1 else None
-            mean = feet[inside, joint].mean(axis=0)
-            if before is None and after is None:
-                anchor = np.broadcast_to(mean, (frames, 3))
+            free = before is None and after is None
+            if free:
+                anchor = np.broadcast_to(feet[inside, joint].mean(axis=0), (frames, 3))
             else:
                 ends = (before if before is not None else after, after if after is not None else before)
                 share = ramp((time - first + 1) / (last - first + 2))[:, None]
@@ -181,12 +194,20 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
             left = min(blend, (start - held[k - 1][1]) // 2 + 1) if k else blend
             right = min(blend, (held[k + 1][0] - stop) // 2 + 1) if k + 1 < len(held) else blend
             share = ramp(1 - (start - time) / (left + 1)) * ramp(1 - (time - stop + 1) / (right + 1))
+            share *= movable
             inner = np.clip(time, start, stop - 1)
-            shifts[:, joint] += share[:, None] * (anchor[inner] - feet[inner, joint])
+            shifts[int(free), :, joint] += share[:, None] * (anchor[inner] - feet[inner, joint])
             shares[:, joint] = np.maximum(shares[:, joint], share)
     shifts[..., 1] = 0.0
-    other = shifts[:, ::-1]
-    return shifts + (1 - shares)[..., None] * other
+    tied, loose = shifts + (1 - shares)[..., None] * shifts[:, :, ::-1]
+    return tied, loose
+
+
+def _smooth(lift: np.ndarray, fps: float) -> np.ndarray:
+    """A lift (F,) that is nowhere less but comes and goes over some frames."""
+    reach = max(1, round(SOFT * fps))
+    wide = ndimage.maximum_filter1d(lift, 2 * reach + 1, mode="nearest")
+    return ndimage.gaussian_filter1d(wide, reach / 2, mode="nearest")
 
 
 def _lift(depth: np.ndarray) -> np.ndarray:
