@@ -40,8 +40,9 @@ def test_a_sliding_stance_is_held_where_it_is_observed(walk, speaking):
     known = gaps_of(walk, (45, 75))
     joints = feet.ends(walk.skeleton)
     positions = walk.positions()[:, joints]
-    floor = feet.local_floor(positions, np.ones(positions.shape[:2], bool), walk.fps)
-    planted = feet.contacts(positions, floor, walk.fps)
+    planted = (measures.speed(positions, walk.fps) < 0.1) & (
+        positions[..., 1] < positions[..., 1].min(axis=0) + 0.03
+    )
     method = speaking(walk, sigma=0.0)
     method.positions += np.clip((np.arange(120) - 45) / 30, 0, 1)[:, None, None] * [0.0, 0.0, 0.06]
     done = complete(walk, known, method)
@@ -113,3 +114,25 @@ def test_measures_of_feet():
     raised = moving + np.array([0.0, 0.0125, 0.0])
     assert measures.foot_slide(raised, 30.0, np.zeros(1)) == pytest.approx(100 * (2 - 2**0.5))
     assert measures.foot_slide(moving + np.array([0.0, 0.03, 0.0]), 30.0, np.zeros(1)) == 0
+
+
+def test_stances_are_stiller_by_a_measure_that_lifting_cannot_better(walk, speaking, monkeypatch):
+    """Slide falls when feet are raised; the speed of feet that stand in the truth does not."""
+    known = gaps_of(walk, (40, 80))
+    joints = feet.ends(walk.skeleton)
+    truth = walk.positions()[:, joints]
+    planted = (measures.speed(truth, walk.fps) < 0.15) & (truth[..., 1] < truth[..., 1].min(axis=0) + 0.03)
+    planted[:40] = planted[80:] = False
+    sliding = truth + np.linspace(0, 1.0, len(walk))[:, None, None] * [1.0, 0.0, 0.0]
+    raised = sliding + np.array([0.0, 0.03, 0.0])
+    low = truth[..., 1].min(axis=0)
+    assert measures.foot_slide(raised, walk.fps, low) < 0.5 * measures.foot_slide(sliding, walk.fps, low)
+    assert measures.stance_speed(raised, planted, walk.fps) == measures.stance_speed(
+        sliding, planted, walk.fps
+    )
+
+    held = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
+    monkeypatch.setattr(feet, "plant", lambda clip, known, span: clip)
+    loose = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
+    still, moving = (measures.stance_speed(p, planted, walk.fps) for p in (held, loose))
+    assert still < 0.8 * moving

@@ -9,6 +9,7 @@ from interpose.finish.measures import (
     joint_error,
     seam_jump,
     speed,
+    stance_speed,
 )
 
 __all__ = [
@@ -20,4 +21,5 @@ __all__ = [
     "joint_error",
     "seam_jump",
     "speed",
+    "stance_speed",
 ]
