@@ -89,7 +89,7 @@ def foot_travel(positions: np.ndarray) -> float:
 def stance_speed(positions: np.ndarray, planted: np.ndarray, fps: float) -> float:
     """Mean horizontal speed in centimetres a second of feet (F, n, 3) while they stand in the truth (F, n).
 
-    Where the truth is known, to be read beside `foot_slide`: that one stops counting 2.5 cm above the floor, so
+    For known truth, to be read beside `foot_slide`: that one stops counting 2.5 cm above the floor, so
     that lifting a foot that slides lowers it, too. This one does not look at heights. NaN without stances.
     """
     return 100.0 * float(speed(positions, fps)[planted].mean()) if planted.any() else float("nan")
