@@ -22,15 +22,16 @@ from interpose.skeletons import JOINTS, find_mapping
 # is no higher above the floor than HIGH and lasts at least SHORT seconds. What moves further than STEP in it is no
 # stance that slides but a low step. The speeds are those of networks, whose stances slide; stances of real feet
 # are ten times slower.
-SLOW, FAST, HIGH, SHORT, STEP = 0.80, 1.40, 0.06, 0.10, 0.50
+SLOW, FAST, HIGH, SHORT, STEP = 0.50, 1.00, 0.05, 0.10, 0.50
 # An observed stance is slower than this (metres a second), and no higher than this above the lowest one.
 STILL, LEVEL = 0.30, 0.08
 # Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam.
 BLEND = 0.15
 # A foot may sink this far (metres) below the lowest stances nearby; the bound is rounded off over as much.
 SINK = 0.005
-# Metres by which a foot clears the floor once it is twice as fast as FAST, and seconds over which it is lifted.
-CLEAR, SOFT = 0.03, 0.07
+# Metres by which a foot clears the floor once it is twice as fast as QUICK (metres a second), and seconds over
+# which it is lifted.
+CLEAR, QUICK, SOFT = 0.03, 0.50, 0.07
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -98,7 +99,8 @@ def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray
     planted = np.zeros_like(low)
     for joint in range(low.shape[1]):
         for start, stop in runs(possible[:, joint]):
-            moved = np.linalg.norm(np.ptp(positions[start:stop, joint][:, [0, 2]], axis=0))
+            way = positions[start:stop, joint][:, [0, 2]] - positions[start, joint, [0, 2]]
+            moved = np.linalg.norm(way, axis=1).max()
             if certain[start:stop, joint].any() and stop - start >= SHORT * fps and moved < STEP:
                 planted[start:stop, joint] = True
     return planted
@@ -151,7 +153,7 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         planted = contacts(feet, floor, clip.fps)
         tied, shift = _hold(feet, planted, movable, clip.fps)
         speeds = measures.speed(feet + tied + shift, clip.fps)
-        lowest = floor - SINK + CLEAR * ramp((speeds - FAST) / FAST)
+        lowest = floor - SINK + CLEAR * ramp(speeds / QUICK - 1)
         shift[..., 1] += _smooth(_lift((lowest - feet[..., 1]).max(axis=1)), clip.fps)[:, None]
         shift = tied + shift * _envelope(movable, clip.fps)[:, None, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
