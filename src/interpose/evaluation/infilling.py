@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
+from interpose.clip import Clip
 from interpose.evaluation.windows import Window, windows
-from interpose.finish import complete
-from interpose.finish.feet import measure
+from interpose.finish import complete, feet, measures
 from interpose.finish.guarantees import wipe
 from interpose.methods import registry
 from interpose.observation import Gap, Observation
@@ -44,7 +44,7 @@ class Infilling:
     errors: dict[str, dict[str, dict[int, list[np.ndarray]]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(lambda: defaultdict(list)))
     )
-    feet: dict[str, dict[int, list[tuple[float, float]]]] = field(
+    feet: dict[str, dict[int, list[tuple[float, float, float]]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(list))
     )
     solves: list[float] = field(default_factory=list)
@@ -71,10 +71,10 @@ class Infilling:
         mine, linear = self.mean(group, row, frames), self.mean(group, PAPER, frames)
         return mine[0] / linear[0] if mine and linear else None
 
-    def foot(self, row: str, frames: int) -> tuple[float, float]:
-        """Mean slide (cm/s) and travel (m) of the feet in the gap."""
-        slide, travel = np.mean(self.feet[row][frames], axis=0)
-        return float(slide), float(travel)
+    def foot(self, row: str, frames: int) -> dict[str, float]:
+        """Of the feet in the gap: mean slide (cm/s), travel (m), and speed in the truth's stances (cm/s)."""
+        means = np.nanmean(self.feet[row][frames], axis=0)
+        return {name: float(mean) for name, mean in zip(("slide", "travel", "stance_speed"), means)}
 
     def to_dict(self) -> dict[str, Any]:
         groups: dict[str, Any] = {}
@@ -88,8 +88,7 @@ class Infilling:
                 for row in ROWS
             }
         feet = {
-            row: {str(frames): dict(zip(("slide", "travel"), self.foot(row, frames))) for frames in held}
-            for row, held in self.feet.items()
+            row: {str(frames): self.foot(row, frames) for frames in held} for row, held in self.feet.items()
         }
         return {
             "protocol": "Kaufmann et al. 2020, table 1, at 30 fps",
@@ -117,15 +116,13 @@ class Infilling:
         return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def feet_table(self) -> str:
-        """A Markdown table of foot slide and travel in the gap, next to the truth's."""
+        """A Markdown table of the feet in the gap, next to the truth's."""
         frames = [gap for gap in GAPS if gap]
-        lines = [
-            ["feet: slide cm/s, travel m", *(f"{gap} frames" for gap in frames)],
-            ["---"] + ["---:"] * len(frames),
-        ]
+        lines = [["feet", *(f"{gap} frames" for gap in frames)], ["---"] + ["---:"] * len(frames)]
         for row in self.feet:
             figures = [self.foot(row, gap) for gap in frames]
-            lines.append([row, *(f"{slide:.1f}, {travel:.2f}" for slide, travel in figures)])
+            cells = [f"{f['slide']:.1f}, {f['travel']:.2f}, {f['stance_speed']:.1f}" for f in figures]
+            lines.append([row, *cells])
         return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
     def __str__(self) -> str:
@@ -136,6 +133,7 @@ class Infilling:
         drift = ", ".join(f"{np.mean(held):.1f} cm at {gap}" for gap, held in self.drifts.items())
         notes = [
             "Mean ± standard deviation of the joint error in cm (ratio to the paper's linear row).",
+            "Feet: slide in cm/s, travel in m, speed in cm/s where the truth's feet stand.",
             f"Solve: {np.mean(self.solves):.2f} cm from the network's positions.",
             f"Root drift before correction: {drift}.",
             f"Fell back to the spline: {dict(self.fallen) or 'never'}.",
@@ -212,7 +210,14 @@ def _linear(positions: np.ndarray, gap: Gap) -> np.ndarray:
     return filled
 
 
-def _feet(result: Infilling, window: Window, clip: Any, hidden: Observation, gap: Gap, row: str) -> None:
-    measured = measure(clip, hidden, gap.start, gap.stop)
-    if measured:
-        result.feet[row][len(gap)].append(measured)
+def _feet(result: Infilling, window: Window, clip: Clip, hidden: Observation, gap: Gap, row: str) -> None:
+    """Slide looks at low feet, so lifting one lessens it; the speed in true stances does not."""
+    measured = feet.measure(clip, hidden, gap.start, gap.stop)
+    if measured is None:
+        return
+    part, joints = slice(gap.start, gap.stop), feet.ends(clip.skeleton)
+    truth = window.clip.positions()[:, joints]
+    floor = feet.local_floor(truth, hidden.positions(clip.skeleton)[:, joints], clip.fps)
+    stands = (measures.speed(truth, clip.fps) < feet.STILL) & (truth[..., 1] < floor + feet.HIGH)
+    speed = measures.stance_speed(clip.positions()[part][:, joints], stands[part], clip.fps)
+    result.feet[row][len(gap)].append((*measured, speed))
