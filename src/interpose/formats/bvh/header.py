@@ -12,12 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from interpose.errors import FileError
+from interpose.formats.text import line_of, number
 
 HEADER_LIMIT = 4 << 20  # bytes: what comes before the first number of the motion
 JOINT_LIMIT = 2000  # kinematics keep a matrix (joints, joints)
-VALUE_LIMIT = 1e9  # degrees or file units; what is above is damage, and would overflow later
 
-NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\Z", re.ASCII)
 _CHANNEL = re.compile(r"([XYZ])(position|rotation)\Z", re.IGNORECASE)
 _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
@@ -74,12 +73,6 @@ class Header:
         return sum(len(node.channels or ()) for node in self.nodes)
 
 
-def line_of(text: bytes, position: int) -> int:
-    """The 1-based number of the line in which the byte `position` stands."""
-    ends = text.count(b"\n", 0, position)
-    return 1 + (ends or text.count(b"\r", 0, position))
-
-
 def parse_header(start: bytes, name: str) -> Header:
     """The header from the first bytes of a file (at most HEADER_LIMIT of them are looked at).
 
@@ -109,7 +102,7 @@ def parse_header(start: bytes, name: str) -> Header:
             what, f"line {line}: no number of frames", 'Below MOTION must stand "Frames:" and a number.'
         )
     time = _FRAME_TIME.match(start, frames.end())
-    seconds = _number(time[1].decode("latin-1")) if time else None
+    seconds = number(time[1].decode("latin-1")) if time else None
     if time is None or seconds is None or not seconds > 0 or not math.isfinite(1 / seconds):
         line = line_of(start, frames.end()) + 1
         shown = f"the frame time is {time[1][:40].decode('latin-1')}" if time else "no frame time"
@@ -126,14 +119,6 @@ def parse_header(start: bytes, name: str) -> Header:
         frames.span(1),
         time.span(1),
     )
-
-
-def _number(word: str) -> float | None:
-    """A finite number of sensible size, or None."""
-    if not NUMBER.match(word) or len(word) > 64:
-        return None
-    value = float(word)
-    return value if abs(value) <= VALUE_LIMIT else None
 
 
 def _rate(text: str, seconds: float) -> float:
@@ -153,13 +138,13 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
     ahead: int | None = None
     in_end = False
 
-    number = 0
+    at = 0
 
     def bad(why: str, fix: str = "The file is damaged: export it again.") -> FileError:
-        return FileError(what, f"line {number}: {why}", fix)
+        return FileError(what, f"line {at}: {why}", fix)
 
     for line in text.removeprefix(b"\xef\xbb\xbf").splitlines():
-        number += 1
+        at += 1
         try:
             decoded = line.decode("utf-8")
         except UnicodeDecodeError:
@@ -199,7 +184,7 @@ def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
                 words = words[words.index("{") :] if "{" in words else []
                 waiting = in_end = True
             elif word == "OFFSET":
-                values = [_number(w) for w in words[:3]]
+                values = [number(w) for w in words[:3]]
                 if len(values) < 3 or None in values or (len(words) > 3 and words[3] != "}"):
                     raise bad(f"OFFSET needs three numbers, found {' '.join(words)[:60]!r}")
                 offset = tuple(float(v) for v in values)  # type: ignore[arg-type]

@@ -7,48 +7,22 @@ number. Everything else is made in chunks of frames.
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from interpose.errors import FileError
-from interpose.formats.bvh.header import HEADER_LIMIT, NUMBER, VALUE_LIMIT, Header, line_of, parse_header
+from interpose.formats.bvh.header import HEADER_LIMIT, Header, parse_header
+from interpose.formats.text import NUMBER, VALUE_LIMIT, FrameText, line_of, nth_words
 
 BLOCK = 4 << 20  # bytes read and scanned at once
 LINE_LIMIT = 8 << 20  # bytes: no line of a real clip comes near
 NUMBER_LIMIT = 64  # bytes of a number with the blanks behind it, on average
 FILE_LIMIT = 2 << 30  # bytes: five hours at 120 frames a second
-CHUNK_NUMBERS = 1 << 17
 
 
-@dataclass(frozen=True, eq=False)
-class MotionText:
-    """The numbers of a motion as the file has them.
-
-    Attributes:
-        text: (bytes of the file,) uint8.
-        starts: (F + 1,) where each frame's first number begins; the last entry is the end of the file.
-        channels: how many numbers a frame has.
-        name: of the file, for errors.
-    """
-
-    text: np.ndarray
-    starts: np.ndarray
-    channels: int
-    name: str
-
-    def __len__(self) -> int:
-        return len(self.starts) - 1
-
-    @property
-    def chunk(self) -> int:
-        """Frames in a chunk."""
-        return max(1, CHUNK_NUMBERS // self.channels)
-
-    def raw(self, start: int, stop: int) -> bytes:
-        """The text of the frames start to stop - 1, with the blanks and line ends behind each."""
-        return self.text[self.starts[start] : self.starts[stop]].tobytes()
+class MotionText(FrameText):
+    """The numbers of a motion as the file has them: every word is one."""
 
     def values(self, start: int, stop: int) -> np.ndarray:
         """(stop - start, C) numbers of the frames; raises FileError when one is no finite number."""
@@ -123,7 +97,7 @@ def read_text(path: Path) -> tuple[Header, MotionText]:
             last_end = filled + end if end >= 0 else last_end
             filled += got
     text = text[:filled]
-    return header, MotionText(text, _frame_starts(text, header, what), header.channels, name)
+    return header, MotionText(text, _frame_starts(text, header, what), np.arange(header.channels), name)
 
 
 def _truncated(what: str, header: Header, numbers: int) -> FileError:
@@ -142,14 +116,7 @@ def _frame_starts(text: np.ndarray, header: Header, what: str) -> np.ndarray:
     Raises FileError when there are too few or too many numbers.
     """
     begin, channels = len(header.text), header.channels
-    found, seen = [], 0
-    for low in range(begin, len(text), BLOCK):
-        # One byte more in front: a word begins where a blank is followed by something else.
-        blank = text[low - 1 : low + BLOCK] <= 32
-        words = np.flatnonzero(blank[:-1] & ~blank[1:])
-        found.append(low + words[-seen % channels :: channels])
-        seen += len(words)
-    starts = np.concatenate(found) if found else np.empty(0, int)
+    starts, seen = nth_words(text, begin, channels)
     if seen == header.frames * channels:
         lines = _nonblank_lines(text[begin:])
         # Frames may share lines or be wrapped, but one line a frame leaves no doubt about where they begin.

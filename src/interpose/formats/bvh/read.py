@@ -8,19 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import FileError, RequestError, unknown
+from interpose.errors import FileError, unknown
+from interpose.formats import place
 from interpose.formats.bvh.header import Header, Node
 from interpose.formats.bvh.layout import Layout, make_layout
 from interpose.formats.bvh.motion_text import MotionText, read_text
-from interpose.geometry import kinematics
-from interpose.skeletons import JOINTS, Mapping, find_mapping
-
-# Metres. The last is the scale of the CMU data: 1/0.45 inch.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254, "CMU": 0.0254 / 0.45}
-LEG = 0.45, 1.25  # metres: thigh and shin of a child and of a giant
-USUAL_LEG = 0.85
-BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
-SAMPLE = 51  # frames looked at for estimates
+from interpose.skeletons import find_mapping
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,8 +56,7 @@ class BvhSource:
 
     def describe(self) -> tuple[str, ...]:
         """What was found out about the file, one line each, for printing."""
-        name = next((f" ({name})" for name, size in UNITS.items() if np.isclose(size, self.unit)), "")
-        lines = [f"unit: {self.unit:.6g} m{name}, {self.unit_how}", f"up: {self.up.upper()}, {self.up_how}"]
+        lines = [place.unit_line(self.unit, self.unit_how), f"up: {self.up.upper()}, {self.up_how}"]
         if self.positions != "none":
             verb = "replace" if self.positions == "replace" else "add to"
             lines.append(f"position channels: {verb} the OFFSET, {self.positions_how}")
@@ -91,15 +83,13 @@ def read(
         FileError: the file is not a whole, sound BVH file.
         RequestError: an option is wrong.
     """
-    scale = _given_unit(unit)
-    if up is not None and up.lower() not in ("y", "z"):
-        raise unknown("up axis", up, ("y", "z"))
+    scale, axis = place.given_unit(unit), place.given_up(up)
     if joint_positions not in (None, "replace", "add"):
         raise unknown("meaning of joint positions", joint_positions, ("replace", "add"))
 
     header, motion = read_text(path)
     nodes = header.nodes
-    frames = np.unique(np.linspace(0, len(motion) - 1, SAMPLE).astype(int)).tolist()
+    frames = place.sample_frames(len(motion))
     # Short clips are parsed once; of long ones the sample is parsed by itself, to keep memory small.
     short = motion.values(0, len(motion)) if len(motion) <= motion.chunk else None
     sample = np.concatenate([motion.values(f, f + 1) for f in frames]) if short is None else short[frames]
@@ -113,8 +103,8 @@ def read(
     mapping = find_mapping(skeleton)
     clip = Clip(skeleton, turned, moved, header.fps, raw.translated)
 
-    scale, unit_how = (scale, "given") if scale else _estimate_unit(mapping, clip)
-    axis, up_how = (up.lower(), "given") if up else _estimate_up(mapping, clip)
+    scale, unit_how = (scale, "given") if scale else place.estimate_unit(mapping, clip)
+    axis, up_how = (axis, "given") if axis else place.estimate_up(mapping, clip)
     layout = replace(raw, unit=scale, up=axis)
     skeleton = Skeleton(skeleton.names, skeleton.parents, layout.vectors(skeleton.rest_translation))
 
@@ -126,22 +116,6 @@ def read(
         rotation[part], translation[part] = layout.decode(values)
     source = BvhSource(header, motion, skeleton, layout, unit_how, up_how, positions, positions_how)
     return Clip(skeleton, rotation, translation, header.fps, layout.translated, path.stem, source)
-
-
-def _given_unit(unit: float | str | None) -> float | None:
-    """Metres per file unit from what the user gave."""
-    if unit is None:
-        return None
-    names = {name.lower(): size for name, size in UNITS.items()} | {"in": UNITS["inch"]}
-    try:
-        size = names[unit.lower()] if isinstance(unit, str) and unit.lower() in names else float(unit)
-    except (TypeError, ValueError):
-        raise unknown("unit", unit, (*UNITS, "or metres per unit, such as 0.01")) from None
-    if not 1e-9 < size < 1e9:
-        raise RequestError(
-            f"the unit {unit} is impossible", "it is metres per unit of the file", "Write for example 0.01."
-        )
-    return size
 
 
 def _joint_positions(
@@ -205,36 +179,3 @@ def _skeleton(nodes: tuple[Node, ...], layout: Layout, median: np.ndarray, path:
             "Export the clip with its skeleton.",
         )
     return Skeleton(tuple(names), tuple(node.parent for node in nodes), rest)
-
-
-def _estimate_unit(mapping: Mapping, clip: Clip) -> tuple[float, str]:
-    """Metres per file unit, and how it was found: from the legs, else from the size of the body."""
-    leg = mapping.leg_length
-    if np.isfinite(leg) and leg > 0:
-        for size in UNITS.values():
-            if LEG[0] <= size * leg <= LEG[1]:
-                return size, f"estimated from a leg of {size * leg:.2f} m"
-        return USUAL_LEG / leg, f"assumed, so that the leg is {USUAL_LEG} m"
-    positions = clip.positions()
-    extent = float(np.median(np.linalg.norm(np.ptp(positions, axis=1), axis=-1)))
-    for name in ("m", "cm", "mm", "inch", "CMU"):
-        if BODY[0] <= UNITS[name] * extent <= BODY[1]:
-            return UNITS[name], f"estimated from a body of {UNITS[name] * extent:.2f} m, no legs found"
-    return UNITS["cm"], "assumed, no legs found"
-
-
-def _estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
-    """The up axis: the mean direction from the feet to the head over the clip."""
-    head, left, right = (mapping.joints[JOINTS.index(j)] for j in ("Head", "LeftFoot", "RightFoot"))
-    if head is None or left is None or right is None:
-        return "y", "assumed, no head and feet found"
-    _, places = kinematics.forward(clip.rotation, clip.local_translation(), clip.skeleton.parents)
-    body = places[:, head] - 0.5 * (places[:, left] + places[:, right])
-    length = np.linalg.norm(body, axis=-1, keepdims=True)
-    mean = np.mean(body / np.where(length > 0, length, 1.0), axis=0)
-    # Someone who lies down for the whole clip says nothing; only a clear sign departs from the usual Y.
-    if mean[2] > 0.7 and abs(mean[1]) < mean[2]:
-        return "z", "estimated from the direction from feet to head"
-    if mean[1] > 0.5:
-        return "y", "estimated from the direction from feet to head"
-    return "y", "assumed, the direction from feet to head is not clear"

@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import re
-from dataclasses import dataclass
 from typing import BinaryIO
 
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.formats import angles, place
 from interpose.formats.bvh.header import Header
-from interpose.formats.bvh.layout import Layout
-from interpose.formats.bvh.motion_text import MotionText
 from interpose.formats.bvh.read import BvhSource
+from interpose.formats.changes import Lost, same_skeleton, translation_of, write_frames
+from interpose.formats.text import DECIMALS
 from interpose.geometry import rotations
 
-_WORD = re.compile(rb"(\S+)")
-DECIMALS = 6  # of files without a source
-LEAST_DECIMALS, MOST_DECIMALS = 4, 12  # of changed numbers, whatever the file's own have
 CENTIMETRE = 0.01
 
 
@@ -29,20 +25,10 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     gets a new header: centimetres, Y up, rotation order ZXY, six channels for roots and translated joints.
     """
     source = clip.source
-    if isinstance(source, BvhSource) and _same_skeleton(clip, source):
+    if isinstance(source, BvhSource) and same_skeleton(clip.skeleton, source.skeleton):
         return _write_changes(clip, source, stream)
     _write_new(clip, stream)
     return ()
-
-
-def _same_skeleton(clip: Clip, source: BvhSource) -> bool:
-    mine, other = clip.skeleton, source.skeleton
-    return mine is other or (
-        mine.names == other.names
-        and mine.parents == other.parents
-        and np.array_equal(mine.rest_translation, other.rest_translation)
-        and np.array_equal(mine.rest_scale, other.rest_scale)
-    )
 
 
 # Changes to the text of a file --------------------------------------------------------------------------
@@ -52,36 +38,12 @@ def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str
     motion = source.motion
     stream.write(_header(clip, source.header))
     stream.write(motion.text[len(source.header.text) : motion.starts[0]].tobytes())
-    style = _style(motion)
-    line_end = b"\r\n" if b"\r\n" in source.header.text else b"\n"
-    pattern = motion.raw(len(motion) - 1, len(motion)).rstrip() + line_end
-    lost = _Lost(np.zeros(len(clip.skeleton)), np.zeros(len(clip.skeleton)))
-    previous = np.zeros(motion.channels)
+    lost = Lost.nothing(len(clip.skeleton))
 
-    def kept(start: int, stop: int) -> bytes:
-        """The original text of some frames. The last one may lack a line end that it needs now."""
-        text = motion.raw(start, stop) if start < stop else b""
-        return text.rstrip() + line_end if text and stop == len(motion) < len(clip) else text
+    def put(values: np.ndarray, known: int, start: int, previous: np.ndarray) -> np.ndarray:
+        return _put_motion(values, known, clip, source, start, previous, lost)
 
-    for start in range(0, len(clip), motion.chunk):
-        stop = min(start + motion.chunk, len(clip))
-        known = max(0, min(stop, len(motion)) - start)
-        values = np.zeros((stop - start, motion.channels))
-        if known:
-            values[:known] = motion.values(start, start + known)
-        old = values[:known].copy()
-        fresh = _put_motion(values, known, clip, source, start, previous, lost)
-        previous = values[-1].copy()
-        values = np.round(values, style.decimals) + 0.0  # no negative zeros
-        # What comes out the same to the last written decimal did not change.
-        fresh[:known] &= np.abs(values[:known] - old) > 0.5001 * 10.0**-style.decimals
-        done = 0
-        for row in np.flatnonzero(fresh.any(axis=1)).tolist():
-            stream.write(kept(start + done, start + min(row, known)))
-            text = kept(start + row, start + row + 1) if row < known else pattern
-            stream.write(_exchange(text, values[row], fresh[row], style))
-            done = row + 1
-        stream.write(kept(start + done, start + known))
+    write_frames(motion, len(clip), put, stream, b"\r\n" if b"\r\n" in source.header.text else b"\n")
     return lost.notes(clip.skeleton.names)
 
 
@@ -93,19 +55,6 @@ def _header(clip: Clip, header: Header) -> bytes:
     return text[:a] + frames + text[b:c] + seconds + text[d:]
 
 
-@dataclass
-class _Lost:
-    """The most that a joint loses because the file has no channel for it: degrees (J,) and metres (J,)."""
-
-    degrees: np.ndarray
-    metres: np.ndarray
-
-    def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        turned = [f"{names[j]}: {self.degrees[j]:.1f} degrees" for j in np.flatnonzero(self.degrees > 0.1)]
-        moved = [f"{names[j]}: {self.metres[j]:.3f} m" for j in np.flatnonzero(self.metres > 1e-4)]
-        return tuple(f"no channel holds all of the motion of {note} are lost" for note in turned + moved)
-
-
 def _put_motion(
     values: np.ndarray,
     known: int,
@@ -113,7 +62,7 @@ def _put_motion(
     source: BvhSource,
     start: int,
     previous: np.ndarray,
-    lost: _Lost,
+    lost: Lost,
 ) -> np.ndarray:
     """Put the frames of the clip from `start` into `values` (n, C), of which `known` are the file's own.
 
@@ -121,7 +70,7 @@ def _put_motion(
     """
     layout, stop = source.layout, start + len(values)
     rotation = clip.rotation[start:stop]
-    translation = _translation(clip, layout, start, stop, lost)
+    translation = translation_of(clip, layout.translated, start, stop, lost)
     turned, moved = np.ones(rotation.shape[:2], bool), np.ones(translation.shape, bool)
     if known:
         was_rotation, was_translation = layout.decode(values[:known])
@@ -129,107 +78,26 @@ def _put_motion(
         moved[:known] = translation[:known] != was_translation
     fresh = np.zeros(values.shape, bool)
     if moved.any():
-        positions, moved = layout.positions(translation), layout.in_file(moved)
+        positions, moved = layout.positions(translation), place.axes_in_file(moved, layout.up)
         for k, columns in enumerate(layout.translation_columns):
             has = columns >= 0
             fresh[:, columns[has]] = moved[:, k, has]
             kept = values[:, columns[has]]
             values[:, columns[has]] = np.where(moved[:, k, has], positions[:, k, has], kept)
             if not has.all():
-                missed = np.abs(positions[:, k, ~has]).max() * layout.unit
-                lost.metres[layout.translated[k]] = max(lost.metres[layout.translated[k]], missed)
-    if turned.any():
-        _put_angles(values, fresh, rotation, turned, previous, layout, lost)
+                lost.moved(layout.translated[k], np.abs(positions[:, k, ~has]).max() * layout.unit)
+    lost.turned(
+        angles.put(
+            values,
+            fresh,
+            place.rotations_in_file(rotation, layout.up),
+            turned,
+            previous,
+            layout.orders,
+            layout.rotation_columns,
+        )
+    )
     return fresh
-
-
-def _translation(clip: Clip, layout: Layout, start: int, stop: int, lost: _Lost) -> np.ndarray:
-    """(n, K, 3) translations of the joints that the file can move."""
-    if clip.translated == layout.translated:
-        return clip.translation[start:stop]
-    rest = clip.skeleton.rest_translation
-    moved = np.tile(rest[list(layout.translated)], (stop - start, 1, 1))
-    for k, joint in enumerate(clip.translated):
-        if joint in layout.translated:
-            moved[:, layout.translated.index(joint)] = clip.translation[start:stop, k]
-        else:
-            missed = np.abs(clip.translation[start:stop, k] - rest[joint]).max()
-            lost.metres[joint] = max(lost.metres[joint], missed)
-    return moved
-
-
-def _put_angles(
-    values: np.ndarray,
-    fresh: np.ndarray,
-    rotation: np.ndarray,
-    turned: np.ndarray,
-    previous: np.ndarray,
-    layout: Layout,
-    lost: _Lost,
-) -> None:
-    """Put the Euler angles of the turned joints into `values`, without jumps from frame to frame.
-
-    Of the two triples that mean the same rotation, and of their full turns, the nearest to the frame before
-    is taken. `previous` (C,) are the numbers of the frame before the first.
-    """
-    joints = np.flatnonzero(turned.any(axis=0))
-    columns = layout.rotation_columns[joints]
-    here = columns >= 0
-    # Angles without a channel must be as near zero as they can be: they weigh more than any jump.
-    weight = np.where(here, 1.0, 1e4)
-    frames = np.flatnonzero(turned.any(axis=1))
-    exact = layout.angles(rotation[frames], joints)
-    mirrored = exact * [1.0, -1.0, 1.0] + 180.0
-    # In gimbal lock only the sum or difference of the outer angles counts: the last one stays as it was.
-    locked = np.abs(np.abs(exact[..., 1]) - 90.0) < 1e-4
-    cyclic = np.array([1.0 if layout.orders[j] in "XYZXY" else -1.0 for j in joints])
-    locks = np.sign(exact[..., 1]) * cyclic * locked
-    for row, one, two, lock in zip(frames.tolist(), exact, mirrored, locks):
-        before = np.where(here, (values[row - 1] if row else previous)[columns], 0.0)
-        if lock.any():
-            shift = (before[:, 2] - one[:, 2]) * np.abs(lock)
-            one = one + np.stack([-lock * shift, 0.0 * shift, shift], axis=1)
-        one = one + 360.0 * np.round((before - one) / 360.0)
-        two = two + 360.0 * np.round((before - two) / 360.0)
-        nearer = (np.abs(two - before) * weight).sum(axis=1) < (np.abs(one - before) * weight).sum(axis=1)
-        chosen = np.where(nearer[:, None], two, one)
-        put = turned[row, joints][:, None] & here
-        values[row, columns[put]] = chosen[put]
-        fresh[row, columns[put]] = True
-        if not here.all():
-            missed = np.abs(np.where(here | ~turned[row, joints][:, None], 0.0, chosen)).max(axis=1)
-            lost.degrees[joints] = np.maximum(lost.degrees[joints], missed)
-
-
-@dataclass(frozen=True)
-class _Style:
-    """How a file writes numbers: so many decimals, with zeros at the end or without."""
-
-    decimals: int
-    trimmed: bool
-
-    def text(self, value: float) -> bytes:
-        text = b"%.*f" % (self.decimals, value)
-        return text.rstrip(b"0").rstrip(b".") if self.trimmed else text
-
-
-def _style(motion: MotionText) -> _Style:
-    """The style of the first numbers of the motion."""
-    words = motion.raw(0, min(len(motion), 1 + 4096 // motion.channels)).lower().split()
-    plain = [word for word in words if b"e" not in word]
-    # Programs that write six digits give small numbers many decimals: those above one tell what is usual.
-    usual = [word for word in plain if re.match(rb"[+-]?0*[1-9]", word)] or plain
-    counts = [len(word.partition(b".")[2]) for word in usual] or [DECIMALS]
-    trimmed = any(count < max(counts) for count in counts)
-    return _Style(min(max(*counts, LEAST_DECIMALS), MOST_DECIMALS), trimmed)
-
-
-def _exchange(text: bytes, values: np.ndarray, fresh: np.ndarray, style: _Style) -> bytes:
-    """The text of a frame with some of its numbers exchanged; blanks and line ends stay."""
-    parts = _WORD.split(text)
-    for index, value in zip(np.flatnonzero(fresh).tolist(), values[fresh].tolist()):
-        parts[2 * index + 1] = style.text(value)
-    return b"".join(parts)
 
 
 # A new file ---------------------------------------------------------------------------------------------
@@ -284,9 +152,9 @@ def _write_numbers(clip: Clip, order: list[int], stream: BinaryIO) -> None:
     before = np.zeros((len(order), 3))
     for start in range(0, len(clip), chunk):
         part = slice(start, min(start + chunk, len(clip)))
-        angles = np.degrees(rotations.to_euler(clip.rotation[part], "ZXY"))
-        mirrored = angles * [1.0, -1.0, 1.0] + 180.0
-        for row, two in zip(angles, mirrored):
+        euler = np.degrees(rotations.to_euler(clip.rotation[part], "ZXY"))
+        mirrored = euler * [1.0, -1.0, 1.0] + 180.0
+        for row, two in zip(euler, mirrored):
             row += 360.0 * np.round((before - row) / 360.0)
             two += 360.0 * np.round((before - two) / 360.0)
             nearer = np.abs(two - before).sum(axis=1) < np.abs(row - before).sum(axis=1)
@@ -297,7 +165,7 @@ def _write_numbers(clip: Clip, order: list[int], stream: BinaryIO) -> None:
             if joint in clip.translated:
                 scale = clip.skeleton.scale_above[joint] / CENTIMETRE
                 columns.append(clip.translation[part, clip.translated.index(joint)] * scale)
-            columns.append(angles[:, joint])
+            columns.append(euler[:, joint])
         rows = np.round(np.concatenate(columns, axis=1), DECIMALS) + 0.0
         pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1]) + "\n"
         stream.write("".join([pattern % tuple(row) for row in rows.tolist()]).encode())

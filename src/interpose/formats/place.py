@@ -1,0 +1,127 @@
+"""The unit and the up axis of files that do not say them: names, estimates, and the way inside."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError, unknown
+from interpose.geometry import kinematics
+from interpose.skeletons import JOINTS, Mapping
+
+INCH = 0.0254
+# Metres. The last is the scale of the CMU data: 1/0.45 inch.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": INCH, "CMU": INCH / 0.45}
+LEG = 0.45, 1.25  # metres: thigh and shin of a child and of a giant
+USUAL_LEG = 0.85
+BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
+SAMPLE = 51  # frames looked at for estimates
+
+# Where the axes X, Y, Z of a file stand in a clip, and their signs. A file with Z up is turned by -90 degrees
+# about X as a whole, rest pose included: exact in floating point, because it only moves numbers.
+_INSIDE = {"y": ((0, 1, 2), (1.0, 1.0, 1.0)), "z": ((0, 2, 1), (1.0, -1.0, 1.0))}
+
+
+def vectors_inside(vectors: np.ndarray, unit: float, up: str) -> np.ndarray:
+    """(..., 3) in file units and axes to metres, Y up."""
+    place, sign = _INSIDE[up]
+    inside = np.empty(np.shape(vectors))
+    inside[..., place] = np.asarray(vectors) * sign
+    return inside * unit
+
+
+def vectors_in_file(vectors: np.ndarray, unit: float, up: str) -> np.ndarray:
+    """(..., 3) in metres, Y up, to file units and axes."""
+    return axes_in_file(vectors, up) * _INSIDE[up][1] / unit
+
+
+def axes_in_file(values: np.ndarray, up: str) -> np.ndarray:
+    """(..., 3) things about the clip's axes in the order of the file's axes."""
+    return values[..., _INSIDE[up][0]]
+
+
+def rotations_inside(q: np.ndarray, up: str) -> np.ndarray:
+    """Rotations (..., 4) about the file's axes to rotations about the clip's."""
+    if up == "y":
+        return q
+    place, sign = _INSIDE[up]
+    inside = q.copy()
+    inside[..., [1 + p for p in place]] = q[..., 1:] * sign
+    return inside
+
+
+def rotations_in_file(q: np.ndarray, up: str) -> np.ndarray:
+    """`rotations_inside` backwards."""
+    if up == "y":
+        return q
+    place, sign = _INSIDE[up]
+    turned = q.copy()
+    turned[..., 1:] = q[..., [1 + p for p in place]] * sign
+    return turned
+
+
+def given_unit(unit: float | str | None) -> float | None:
+    """Metres per file unit from what the user gave."""
+    if unit is None:
+        return None
+    names = {name.lower(): size for name, size in UNITS.items()} | {"in": INCH}
+    try:
+        size = names[unit.lower()] if isinstance(unit, str) and unit.lower() in names else float(unit)
+    except (TypeError, ValueError):
+        raise unknown("unit", unit, (*UNITS, "or metres per unit, such as 0.01")) from None
+    if not 1e-9 < size < 1e9:
+        raise RequestError(
+            f"the unit {unit} is impossible", "it is metres per unit of the file", "Write for example 0.01."
+        )
+    return size
+
+
+def given_up(up: str | None) -> str | None:
+    """ "y" or "z" from what the user gave."""
+    if up is not None and up.lower() not in _INSIDE:
+        raise unknown("up axis", up, ("y", "z"))
+    return None if up is None else up.lower()
+
+
+def unit_line(unit: float, how: str) -> str:
+    """The unit of a file and how it was found, for printing."""
+    name = next((f" ({name})" for name, size in UNITS.items() if np.isclose(size, unit)), "")
+    return f"unit: {unit:.6g} m{name}, {how}"
+
+
+def sample_frames(count: int) -> list[int]:
+    """The frames of a clip to look at for estimates."""
+    return np.unique(np.linspace(0, count - 1, SAMPLE).astype(int)).tolist()
+
+
+def estimate_unit(mapping: Mapping, clip: Clip) -> tuple[float, str]:
+    """Metres per file unit, and how it was found: from the legs, else from the size of the body."""
+    leg = mapping.leg_length
+    if np.isfinite(leg) and leg > 0:
+        for size in UNITS.values():
+            if LEG[0] <= size * leg <= LEG[1]:
+                return size, f"estimated from a leg of {size * leg:.2f} m"
+        return USUAL_LEG / leg, f"assumed, so that the leg is {USUAL_LEG} m"
+    positions = clip.positions()
+    extent = float(np.median(np.linalg.norm(np.ptp(positions, axis=1), axis=-1)))
+    for name in ("m", "cm", "mm", "inch", "CMU"):
+        if BODY[0] <= UNITS[name] * extent <= BODY[1]:
+            return UNITS[name], f"estimated from a body of {UNITS[name] * extent:.2f} m, no legs found"
+    return UNITS["cm"], "assumed, no legs found"
+
+
+def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
+    """The up axis: the mean direction from the feet to the head over the clip."""
+    head, left, right = (mapping.joints[JOINTS.index(j)] for j in ("Head", "LeftFoot", "RightFoot"))
+    if head is None or left is None or right is None:
+        return "y", "assumed, no head and feet found"
+    _, places = kinematics.forward(clip.rotation, clip.local_translation(), clip.skeleton.parents)
+    body = places[:, head] - 0.5 * (places[:, left] + places[:, right])
+    length = np.linalg.norm(body, axis=-1, keepdims=True)
+    mean = np.mean(body / np.where(length > 0, length, 1.0), axis=0)
+    # Someone who lies down for the whole clip says nothing; only a clear sign departs from the usual Y.
+    if mean[2] > 0.7 and abs(mean[1]) < mean[2]:
+        return "z", "estimated from the direction from feet to head"
+    if mean[1] > 0.5:
+        return "y", "estimated from the direction from feet to head"
+    return "y", "assumed, the direction from feet to head is not clear"
