@@ -125,50 +125,66 @@ def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
     return torch.where(nothing, 0, last), torch.where(nothing, 0, first)
 
 
-def integrate(rows: Tensor, image: Image) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-    """The trajectory from predicted movement, anchored at observed frames.
+def pick(values: Tensor, index: Tensor) -> Tensor:
+    """Values (B, T) or (B, T, n) at frames (B, T)."""
+    if values.ndim == 3:
+        index = index[..., None].expand(-1, -1, values.shape[2])
+    return values.gather(1, index)
 
-    Inside a gap the root's velocity and turning rate are summed up from the last observed frame; that
-    drifts, so at the gap's other end the residual in x, z and yaw is spread back by a ramp with zero slope
-    at both ends.
 
-    Returns:
-        root (B, T, 3) and yaw (B, T) without and with that correction.
+# Frames over which a wrong turning rate at the edge of a gap is taken to fade.
+FADE = 15
+
+
+def steady(rows: Tensor, image: Image) -> Tensor:
+    """Movement (B, T, 3) that agrees with what is observed of it.
+
+    What the network gets wrong of the velocity at the last and first observed movement around a gap it is
+    taken to get wrong inside as well, in between linearly; of the turning rate, which sways with every
+    step, only near the edges. Found on validation performers: with gaps of 30 frames the root is off by 2.2
+    instead of 3.4 cm.
+    """
+    moved = image.known[:, 66]
+    said, seen = rows[:, 66:].transpose(1, 2), image.rows[:, 66:].transpose(1, 2)
+    wrong = torch.where(moved[..., None], seen - said, 0.0)
+    last, first = neighbours(moved)
+    frame = torch.arange(rows.shape[2], device=rows.device)
+    since, until = torch.abs(frame - last), torch.abs(first - frame)
+    share = since / torch.where(first > last, first - last, 1)
+    start, end = (torch.clamp(1 - n / FADE, min=0) ** 2 for n in (since, until))
+    # At an open end there is one neighbour only, and `end` says nothing new.
+    linear = torch.where(first > last, 1 - share, start), torch.where(first > last, share, 0.0)
+    faded = start, torch.where(first > last, end, 0.0)
+    weights = (torch.stack([v, v, w], dim=-1) for v, w in zip(linear, faded))
+    fixed = said + sum(w * pick(wrong, at) for w, at in zip(weights, (last, first)))
+    return torch.where(moved[..., None], seen, fixed)
+
+
+def integrate(moves: Tensor, image: Image, correct: bool) -> tuple[Tensor, Tensor]:
+    """The trajectory root (B, T, 3) and yaw (B, T) of movements (B, T, 3), anchored at observed frames.
+
+    Inside a gap velocity and turning rate are summed up from the last observed frame. That drifts; with
+    `correct` the residual in x, z and yaw at the other end is spread back over the gap by a ramp with zero
+    slope at both ends.
     """
     before, after = neighbours(image.placed)
-    length = rows.shape[2]
-    frame = torch.arange(length, device=rows.device)
-
-    def pick(values: Tensor, index: Tensor) -> Tensor:
-        if values.ndim == 3:
-            index = index[..., None].expand(-1, -1, values.shape[2])
-        return values.gather(1, index)
-
-    inside = (after > before) & (frame > before) & (frame < after)
+    frame = torch.arange(moves.shape[1], device=moves.device)
+    inside = (frame > before) & (frame < after) & correct
     share = (frame - before) / torch.where(after > before, after - before, 1)
     ramp = torch.where(inside, share * share * (3 - 2 * share), 0.0)
 
-    def walk(yaw: Tensor) -> Tensor:
-        """The path (B, T, 3), from an arbitrary start, of the predicted velocities under a given yaw."""
-        step = torch.stack([rows[:, 66], torch.zeros_like(rows[:, 66]), rows[:, 67]], dim=-1)
-        earlier = torch.cat([yaw[:, :1], yaw[:, :-1]], dim=1)
-        return torch.cumsum(turn(step, earlier), dim=1)
+    def anchored(sums: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
+        """Sums from the known value before, and by how much they miss the known value after."""
+        start = pick(known, before) - pick(sums, before)
+        return start + sums, pick(known, after) - start - pick(sums, after)
 
-    turned = torch.cumsum(rows[:, 68], dim=1)
-    yaw = pick(image.yaw, before) + turned - pick(turned, before)
-    # What the sums say of the first frame after the gap, against what is observed there.
-    end = pick(image.yaw, before) + pick(turned, after) - pick(turned, before)
-    straight = yaw + ramp * wrap(pick(image.yaw, after) - end)
-    yaw = torch.where(image.placed, image.yaw, yaw)
-    straight = torch.where(image.placed, image.yaw, straight)
-
-    path = walk(yaw)
-    root = pick(image.root, before) + path - pick(path, before)
-    path = walk(straight)
-    start = pick(image.root, before) - pick(path, before)
-    fixed = start + path + ramp[..., None] * (pick(image.root, after) - start - pick(path, after))
-    placed = image.placed[..., None]
-    return torch.where(placed, image.root, root), yaw, torch.where(placed, image.root, fixed), straight
+    yaw, missed = anchored(torch.cumsum(moves[..., 2], dim=1), image.yaw)
+    yaw = torch.where(image.placed, image.yaw, yaw + ramp * wrap(missed))
+    step = torch.stack([moves[..., 0], torch.zeros_like(yaw), moves[..., 1]], dim=-1)
+    # A step is taken in the direction faced before it.
+    earlier = torch.cat([yaw[:, :1], yaw[:, :-1]], dim=1)
+    root, missed = anchored(torch.cumsum(turn(step, earlier), dim=1), image.root)
+    return torch.where(image.placed[..., None], image.root, root + ramp[..., None] * missed), yaw
 
 
 class Infiller(nn.Module):
@@ -208,8 +224,9 @@ class Infiller(nn.Module):
         image = to_image(positions, observed)
         rows = self.predict(image) * self.std + self.mean
         body = rows[:, : 3 * len(JOINTS)].transpose(1, 2).unflatten(2, (len(JOINTS), 3))
-        root, yaw, fixed, straight = integrate(rows, image)
-        return (
-            turn(body, yaw[..., None]) + root[..., None, :],
-            turn(body, straight[..., None]) + fixed[..., None, :],
+        ways = (
+            integrate(rows[:, 66:].transpose(1, 2), image, correct=False),
+            integrate(steady(rows, image), image, correct=True),
         )
+        raw, completed = (turn(body, yaw[..., None]) + root[..., None, :] for root, yaw in ways)
+        return raw, completed
