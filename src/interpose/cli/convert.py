@@ -25,10 +25,11 @@ def convert(
     """Write a clip in another format, or at another frame rate.
 
     A BVH file that becomes one again at the same rate keeps its layout and every number's text. Else BVH is
-    written in centimetres, Y up. The suffix says the format: .bvh, .npz.
+    written in centimetres, Y up. The suffix says the format: .bvh, .npz, .amc (for clips read from .amc).
 
     Try:
       interpose convert take.bvh take.npz
+      interpose convert take.amc take.bvh --skeleton subject.asf
       interpose convert take.bvh take30.bvh --fps 30
 
     Args:

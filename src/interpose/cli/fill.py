@@ -52,7 +52,7 @@ def fill(
     Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
 
     Args:
-        file: the clip (.bvh, .npz).
+        file: the clip (.bvh, .npz, .amc).
         gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
         joints: the joints that are missing, separated by commas: in each --gap, or else in the whole clip.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.

@@ -15,7 +15,8 @@ if TYPE_CHECKING:
 
 
 @Parameter(
-    name="*", group=Group("What a BVH file does not say (estimated, and printed, if not given)", sort_key=8)
+    name="*",
+    group=Group("What a file does not say (found or estimated, and printed, if not given)", sort_key=8),
 )
 @dataclass(frozen=True)
 class Reading:
@@ -27,6 +28,12 @@ class Reading:
         str | None,
         Parameter(help="Position channels of joints replace their OFFSET, or add to it: replace or add."),
     ] = None
+    skeleton: Annotated[
+        Path | None, Parameter(help="The .asf file that an .amc file belongs to, if it is not beside it.")
+    ] = None
+    file_fps: Annotated[
+        float | None, Parameter(help="Frames a second of an .amc file, which does not say it; else 120.")
+    ] = None
 
     def load(self, path: Path) -> Clip:
         """The clip in a file."""
@@ -34,7 +41,7 @@ class Reading:
 
         if path.is_dir():  # whatever its name ends in
             raise FileError(f"cannot read {path}", "it is a directory", "Name one file in it.")
-        return load(path, self.unit, self.up, self.joint_positions)
+        return load(path, self.unit, self.up, self.joint_positions, self.skeleton, self.file_fps)
 
 
 def split_names(texts: list[str]) -> tuple[str, ...]:
@@ -55,6 +62,9 @@ def details(clip: Clip) -> dict[str, Any]:
     source = clip.source
     if hasattr(source, "unit"):
         found |= {"unit": source.unit, "unit_how": source.unit_how, "up": source.up, "up_how": source.up_how}
-        if source.positions != "none":
-            found |= {"joint_positions": source.positions, "joint_positions_how": source.positions_how}
+    if getattr(source, "positions", "none") != "none":
+        found |= {"joint_positions": source.positions, "joint_positions_how": source.positions_how}
+    if hasattr(source, "asf"):
+        found |= {"skeleton": str(source.asf.path), "skeleton_how": source.asf_how}
+        found |= {"file_fps": source.fps, "file_fps_how": source.fps_how}
     return found

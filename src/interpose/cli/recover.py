@@ -37,7 +37,7 @@ def recover(
       interpose recover take.bvh --joints RightFoot --frames 120:160
 
     Args:
-        file: the clip (.bvh, .npz).
+        file: the clip (.bvh, .npz, .amc).
         joints: the joints, separated by commas.
         frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
         output: where to write the clip; the report goes beside it.

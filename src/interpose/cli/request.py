@@ -122,11 +122,23 @@ def reading_of(path: Path | None, reading: Reading) -> Reading:
         return reading  # `from_options` says what is wrong with the file
     if content is None or not _is_report(content):
         return reading
-    said = {
-        name: str(content[name])
-        for name in ("unit", "up", "joint_positions")
-        if content.get(f"{name}_how") == "given" and getattr(reading, name) is None
+    kinds: dict[str, Any] = {
+        "unit": str,
+        "up": str,
+        "joint_positions": str,
+        "skeleton": Path,
+        "file_fps": float,
     }
+    try:
+        said = {
+            name: kind(content[name])
+            for name, kind in kinds.items()
+            if content.get(f"{name}_how") == "given" and getattr(reading, name) is None
+        }
+    except (KeyError, TypeError, ValueError):
+        raise RequestError(
+            f"cannot repeat {path}", "it does not say how its clip was read", "Say it: --unit, --up, ..."
+        ) from None
     return replace(reading, **said)
 
 

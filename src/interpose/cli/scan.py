@@ -16,7 +16,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
       interpose scan take.bvh
 
     Args:
-        file: the clip (.bvh, .npz).
+        file: the clip (.bvh, .npz, .amc).
         json: print JSON for other programs.
     """
     from interpose.observation.scan import scan, to_gaps

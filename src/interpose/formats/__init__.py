@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from interpose.clip import Clip
 from interpose.errors import FileError, RequestError
-from interpose.formats import bvh, npz
+from interpose.formats import asf_amc, bvh, npz
 
 __all__ = ["FORMATS", "Format", "load", "save"]
 
@@ -29,6 +29,7 @@ class Format(NamedTuple):
 FORMATS = {
     ".bvh": Format(bvh.read, bvh.write, ("unit", "up", "joint_positions")),
     ".npz": Format(npz.read, npz.write),
+    ".amc": Format(asf_amc.read, asf_amc.write, ("unit", "up", "skeleton", "fps")),
 }
 
 
@@ -37,8 +38,10 @@ def load(
     unit: float | str | None = None,
     up: str | None = None,
     joint_positions: str | None = None,
+    skeleton: str | Path | None = None,
+    fps: float | None = None,
 ) -> Clip:
-    """Read a clip from a file; the suffix says how (.bvh, .npz). Metres and Y up inside.
+    """Read a clip from a file; the suffix says how (.bvh, .npz, .amc). Metres and Y up inside.
 
     Args:
         path: the file.
@@ -46,9 +49,11 @@ def load(
         up: the file's up axis, "y" or "z". Estimated when None.
         joint_positions: "replace" or "add": what position channels do to a joint's rest translation.
             Estimated when None.
+        skeleton: the .asf file that an .amc file belongs to. Found beside it when None.
+        fps: frames a second of an .amc file, which does not say it. 120 when None.
 
-    What was estimated stands in `clip.source` (for BVH a `bvh.BvhSource`; its `describe()` gives lines to
-    print).
+    What was estimated stands in `clip.source` (a `bvh.BvhSource` or `asf_amc.AmcSource`; its `describe()`
+    gives lines to print).
 
     Raises:
         FileError: the file is missing, unreadable or damaged; the message says what to do.
@@ -57,6 +62,7 @@ def load(
     path = Path(path)
     chosen = _format(path)
     options: dict[str, Any] = {"unit": unit, "up": up, "joint_positions": joint_positions}
+    options |= {"skeleton": skeleton, "fps": fps}
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if name not in chosen.options:
@@ -66,6 +72,8 @@ def load(
                 "Leave the option out.",
             )
     _check_readable(path)
+    if skeleton is not None:
+        _check_readable(Path(skeleton))
     try:
         return chosen.read(path, **options)
     except OSError as error:
@@ -73,9 +81,10 @@ def load(
 
 
 def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
-    """Write a clip to a file, whole or not at all; the suffix says how (.bvh, .npz).
+    """Write a clip to a file, whole or not at all; the suffix says how (.bvh, .npz, .amc).
 
-    A clip that was read from BVH keeps that file's layout and the text of every number that did not change.
+    A clip that was read from BVH or AMC keeps that file's layout and the text of every number that did not
+    change.
 
     Args:
         clip: the clip.
@@ -86,7 +95,8 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         Notes on what the format cannot hold, usually none.
 
     Raises:
-        RequestError: the suffix is unknown, the folder is missing, or the file exists and `force` is False.
+        RequestError: the suffix is unknown, the folder is missing, the file exists and `force` is False, or
+            the clip is none that the format can hold (.amc needs one read from .amc).
         FileError: the file cannot be written.
     """
     path = Path(path)

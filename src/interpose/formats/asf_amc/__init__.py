@@ -1,0 +1,6 @@
+"""ASF and AMC: Acclaim skeleton and motion, text. A motion file is read together with its skeleton file."""
+
+from interpose.formats.asf_amc.read import AmcSource, read
+from interpose.formats.asf_amc.write import write
+
+__all__ = ["AmcSource", "read", "write"]
