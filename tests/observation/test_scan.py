@@ -105,6 +105,17 @@ def test_a_hinge_at_its_limit_is_no_finding():
     assert scan(clip.with_motion(rotation, clip.translation)) == []
 
 
+@pytest.mark.parametrize("step", [8, 40, 110])
+def test_a_joint_that_is_still_but_for_one_step_is_no_finding(step):
+    """A finger without data: filling it over the whole clip would swallow the gaps beside it."""
+    clip = motion()
+    rotation = clip.rotation.copy()
+    rotation[step:, 4] = rotations.exp(np.array([0.12, 0, 0]))
+    stepped = clip.with_motion(rotation, clip.translation)
+    assert scan(stepped) == []
+    assert spans(scan(hold(stepped, 40, 60, [2]))) == [("frozen", ("arm",), 40, 60)]
+
+
 def test_a_duplicated_frame_is_no_finding():
     assert scan(hold(motion(), 60, 61, None)) == []
 

@@ -64,7 +64,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       included, it is one finding of the whole pose, jump or not.
     - "frozen position": the same for a root whose position stands still while the pose does not.
 
-    Joints that never move are not reported.
+    Joints that never move are not reported, nor are those that stand still for half of the clip at a stretch:
+    they have no data to be filled from.
     """
     findings: list[Finding] = []
     known = observation or Observation.full(clip)
@@ -168,7 +169,10 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     together: dict[Run, list[int]] = {}
     for joint in alive.tolist():
         steps = turned[:, joint]
-        for run in _runs(still[:, joint] & ~whole, steps, JUMP_TURN):
+        runs = list(_runs(still[:, joint] & ~whole, steps, JUMP_TURN))
+        if any(2 * (run.stop - run.start) >= len(steps) for run in runs):
+            continue  # no data but for some steps, like the fingers of many files
+        for run in runs:
             value = clip.rotation[first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
