@@ -36,7 +36,7 @@ VERBS = {
 }
 
 HELP = """\
-interpose fills gaps in human motion clips (.bvh, .npz, .amc): your skeleton, your file.
+interpose fills gaps in motion clips (.bvh, .npz, .amc): your skeleton, your file.
 
 Start here:
   interpose demo                          see a gap filled in a real clip

@@ -11,6 +11,7 @@ import numpy as np
 from interpose.clip import Clip, Skeleton
 from interpose.formats.text import FrameText
 
+NAMED = 5  # joints in a note
 # Puts the clip's frames from `start` into values (n, C), of which the first `known` are the file's own, and
 # returns (n, C) True where a number may have changed: put(values, known, start, previous), where `previous`
 # (C,) are the numbers of the frame before.
@@ -77,9 +78,16 @@ class Lost:
         self.metres[joint] = max(self.metres[joint], metres)
 
     def notes(self, names: tuple[str, ...]) -> tuple[str, ...]:
-        turned = [f"{names[j]}: {self.degrees[j]:.1f} degrees" for j in np.flatnonzero(self.degrees > 0.1)]
-        moved = [f"{names[j]}: {self.metres[j]:.3f} m" for j in np.flatnonzero(self.metres > 1e-4)]
-        return tuple(f"no channel holds all of the motion of {note} are lost" for note in turned + moved)
+        """One line for degrees and one for metres, the joints that lose most first; none for nothing."""
+        kinds = (self.degrees, 0.1, "{:.1f} degrees"), (self.metres, 1e-4, "{:.3f} m")
+        lines = []
+        for amounts, least, pattern in kinds:
+            most = sorted(np.flatnonzero(amounts > least).tolist(), key=lambda joint: -amounts[joint])
+            shown = [f"{names[joint]}: {pattern.format(amounts[joint])}" for joint in most[:NAMED]]
+            more = f", and {len(most) - NAMED} joints by less" if len(most) > NAMED else ""
+            if most:
+                lines.append(f"no channel holds all of the motion; at most lost: {', '.join(shown)}{more}")
+        return tuple(lines)
 
 
 def translation_of(clip: Clip, translated: tuple[int, ...], start: int, stop: int, lost: Lost) -> np.ndarray:

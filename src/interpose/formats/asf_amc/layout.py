@@ -21,7 +21,7 @@ import numpy as np
 
 from interpose.formats import angles, place
 from interpose.formats.asf_amc.asf import Asf, Bone
-from interpose.geometry import rotations
+from interpose.geometry import kinematics, rotations
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +77,33 @@ class Layout:
         return rotations.multiply(
             rotations.multiply(rotations.conjugate(self.before), turned), rotations.conjugate(self.after)
         )
+
+    def reachable(
+        self, rotation: np.ndarray, turned: np.ndarray, parents: tuple[int, ...]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Rotations (n, J, 4) about the joints' own axes that their degrees of freedom can make.
+
+        Each joint that is `turned` (n, J) comes as near as it can to the orientation that it has in the clip,
+        so that it makes up for what the joints above it could not do. Also returns how far each stays off,
+        (n, J) degrees.
+        """
+        wanted = place.rotations_in_file(rotation, self.up)
+        aims = kinematics.global_rotations(wanted, parents)
+        made, own = np.empty(aims.shape), self.own_rotations(rotation)
+        for joint, parent in enumerate(parents):
+            above = made[:, parent] if parent >= 0 else rotations.identity(len(made))
+            before, after = self.before[joint], self.after[joint]
+            count = int((self.rotation_columns[joint] >= 0).sum())
+            if turned[:, joint].any():
+                local = rotations.multiply(rotations.conjugate(above), aims[:, joint])
+                inner = rotations.multiply(rotations.conjugate(before), local)
+                inner = rotations.multiply(inner, rotations.conjugate(after))
+                euler, _ = angles.nearest(inner, self.orders[joint], count)
+                nearest = rotations.from_euler(np.radians(euler), self.orders[joint])
+                own[:, joint] = np.where(turned[:, joint, None], nearest, own[:, joint])
+            local = rotations.multiply(rotations.multiply(before, own[:, joint]), after)
+            made[:, joint] = rotations.multiply(above, local)
+        return own, np.where(turned, np.degrees(rotations.angle(made, aims)), 0.0)
 
     def moved(self, values: np.ndarray, translation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers (n, T) in the columns `moving` that give translations (n, K, 3) in metres, Y up.
@@ -136,12 +163,15 @@ def make_layout(asf: Asf, columns: dict[tuple[int, str], int], degrees: bool) ->
     scale = np.ones(len(columns))
     if not degrees:
         scale[[column for (_, token), column in columns.items() if token[0] == "r"]] = np.degrees(1.0)
-    after = rotations.conjugate(frames)
-    after[0] = [1.0, 0.0, 0.0, 0.0]
+    still = np.array(turns).max(axis=1) < 0
+    still[0] = False
+    before = np.where(still[:, None], rotations.identity(len(frames)), frames)  # exactly, not up to rounding
+    after = rotations.conjugate(before)
+    after[0] = rotations.identity()
     return Layout(
         tuple(orders),
         np.array(turns),
-        frames,
+        before,
         after,
         tuple(translated),
         bone_vectors(asf)[translated],

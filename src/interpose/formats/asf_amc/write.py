@@ -17,7 +17,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     """Write the clip as AMC, for the skeleton file that it was read with.
 
     Every number that did not change keeps its text: the clip's values are compared with those read, bit for
-    bit. A joint takes the rotation nearest to the clip's that its degrees of freedom can make.
+    bit. A changed joint comes as near to its orientation in the clip as its degrees of freedom allow.
 
     Returns:
         Notes on what they cannot, per joint the most in degrees or metres, and on the frame rate.
@@ -29,7 +29,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     if not isinstance(source, AmcSource):
         raise RequestError(
             f"cannot write {clip.name or 'the clip'} as AMC",
-            "it was not read from ASF/AMC, so that there is no skeleton file it could belong to",
+            "it does not come straight from an .amc file, so that no skeleton file belongs to it",
             "Write it as .bvh instead.",
         )
     if not same_skeleton(clip.skeleton, source.skeleton):
@@ -87,16 +87,10 @@ def _put_motion(
         values[:, layout.moving] = np.where(changed, new, values[:, layout.moving])
         fresh[:, layout.moving] = changed
     scaled = layout.scaled(values).copy()
-    lost.turned(
-        angles.put(
-            scaled,
-            fresh,
-            layout.own_rotations(rotation),
-            turned,
-            layout.scaled(previous[None])[0],
-            layout.orders,
-            layout.rotation_columns,
-        )
-    )
+    if turned.any():
+        own, off = layout.reachable(rotation, turned, clip.skeleton.parents)
+        lost.turned(off.max(axis=0))
+        before = layout.scaled(previous[None])[0]
+        angles.put(scaled, fresh, own, turned, before, layout.orders, layout.rotation_columns)
     values[:] = np.where(fresh, layout.unscaled(scaled), values)
     return fresh
