@@ -118,6 +118,20 @@ def test_strip_tells_left_from_right_by_darkness():
     assert {p.get("stroke") for p in shown.iter(SVG + "path")} == {"#2563c9"}
 
 
+def test_a_root_at_the_origin_above_the_hips_is_not_drawn():
+    """As in the Bandai-Namco clips; the picture is that of the same motion without it."""
+    plain = takes()
+    above = [Take(t.name, np.insert(t.positions, 0, 0.0, axis=1), t.color, t.ghost) for t in plain]
+    parents, names = [-1, *(parent + 1 for parent in PARENTS)], ["joint_Root", *NAMES]
+    for joints in (None, ("LeftArm",)):
+        gaps = [Gap(30, 60, joints)]
+        for draw in (strip, player):
+            with_root = draw(above, parents, 30, gaps, names=names)
+            assert with_root == draw(plain, PARENTS, 30, gaps, names=NAMES)
+    whole = strip(above, parents, 30, [Gap(30, 60, ("joint_Root",))], names=names)
+    assert whole == strip(plain, PARENTS, 30, [Gap(30, 60)], names=NAMES)
+
+
 def test_strip_of_some_missing_joints_tints_what_hangs_below_them():
     svg = strip(takes()[1:], PARENTS, 30, [Gap(30, 60, ("LeftArm",))], names=NAMES)
     shown = next(g for g in figures(svg, 0) if g.get("class") == "figure filled")

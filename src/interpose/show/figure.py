@@ -134,6 +134,28 @@ def spans(
     return sorted(found, key=lambda span: (span.start, span.stop))
 
 
+def below_origin(
+    positions: Sequence[np.ndarray], parents: Sequence[int], names: Sequence[str] | None, gaps: Sequence[Span]
+) -> tuple[list[np.ndarray], tuple[int, ...], Sequence[str] | None, list[Span]]:
+    """The same without joints above the hips that only say where the origin is.
+
+    Some skeletons hang the hips from a root that stays on the floor at the origin. The line from it to the
+    hips is no bone, and it does not go where the character goes. Such a root has one child, and that one
+    has several: the hips.
+    """
+    parents, takes, gaps = tuple(parents), list(positions), list(gaps)
+    if parents.count(-1) == 1 and parents[:2] == (-1, 0) and parents.count(0) == 1 < parents.count(1):
+        parents = (-1, *(parent - 1 for parent in parents[2:]))
+        takes = [values[:, 1:] for values in takes]
+        names = None if names is None else names[1:]
+        # What is missing at the root moves everything below it.
+        gaps = [
+            Span(g.start, g.stop, None if g.joints is None else frozenset(max(j - 1, 0) for j in g.joints))
+            for g in gaps
+        ]
+    return takes, parents, names, gaps
+
+
 def window(span: tuple[int, int], frames: int) -> tuple[int, int]:
     """The part of `span` that lies inside a clip of `frames` frames; RequestError when there is none."""
     start, stop = max(span[0], 0), min(span[1], frames)

@@ -85,11 +85,14 @@ def player(
         RequestError: takes that do not fit each other or the skeleton, a span outside the clip.
     """
     figure.check(takes, parents, fps, names)
-    frames, joints = np.shape(takes[0].positions)[:2]
-    missing = figure.spans(gaps, frames, names)
+    frames = len(takes[0].positions)
+    whole, parents, names, missing = figure.below_origin(
+        [take.positions for take in takes], parents, names, figure.spans(gaps, frames, names)
+    )
+    joints = len(parents)
     largest = max(LARGEST // (joints * len(takes)), 1)
     start, stop = figure.window(span or _shown(missing, frames, largest), frames)
-    positions = [np.asarray(take.positions[start:stop], float) for take in takes]
+    positions = [np.asarray(values[start:stop], float) for values in whole]
     drawn = figure.body(positions[0], parents, names)
     inside = [
         figure.Span(max(gap.start, start) - start, min(gap.stop, stop) - start, gap.joints)

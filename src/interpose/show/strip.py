@@ -179,10 +179,15 @@ def strip(
     """
     figure.check(takes, parents, fps, names)
     frames = len(takes[0].positions)
-    missing = figure.spans(gaps, frames, names)
+    positions, parents, names, missing = figure.below_origin(
+        [np.asarray(take.positions, float) for take in takes],
+        parents,
+        names,
+        figure.spans(gaps, frames, names),
+    )
     start, stop = figure.window(span or excerpt(missing, frames, fps), frames)
     shown = choose_frames(missing, start, stop, count)
-    reference = np.asarray(takes[0].positions, float)
+    reference = positions[0]
     drawn = figure.body(reference, parents, names)
     floor = figure.floor_height(reference[shown], drawn.feet)
     inside = [gap for gap in missing if gap.start < stop and gap.stop > start]
@@ -191,10 +196,10 @@ def strip(
 
     # Poses beside their slot's middle: (takes, figures, J, 3) right, up, towards the viewer, in metres.
     middle = reference[shown, :1] * (1 - figure.UP) + floor * figure.UP
-    poses = np.stack([np.asarray(take.positions, float)[shown] - middle for take in takes]) @ camera.T
+    poses = np.stack([values[shown] - middle for values in positions]) @ camera.T
     heads = None
     if drawn.head >= 0:
-        centers = [drawn.head_center(np.asarray(take.positions, float)[shown]) for take in takes]
+        centers = [drawn.head_center(values[shown]) for values in positions]
         heads = (np.stack(centers) - middle[:, 0]) @ camera.T
 
     tall = float(
