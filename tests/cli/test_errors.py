@@ -35,6 +35,7 @@ def three_lines(err: str) -> list[str]:
         (["--gap", "60:80", "--joints", ","], "--joints"),
         (["--joints", "leftarm"], "Did you mean LeftArm"),
         (["--gap", "60:80", "--method", "splin"], "spline"),
+        (["--gap", "60:80", "--method", "foo"], "auto, "),
         (["--gap", "60:80", "--max-gap", "0"], "--max-gap"),
         (["--gap", "60:80", "--max-gap", "many"], "whole number"),
         (["--gap", "60:80", "--only-gap", "7"], "7"),
@@ -56,6 +57,17 @@ def test_wrong_usage(run, take, options, says):
     assert done.out == ""
     three_lines(done.err)
     assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"), [(["--frames", "abc"], "--frames 120:160"), (["--method", "foo"], "auto, ")]
+)
+def test_wrong_usage_of_recover(run, take, options, says):
+    done = run("recover", "take.bvh", "--joints", "LeftArm", *options)
+    assert done.code == 2
+    assert says in done.err
+    assert "--gap" not in done.err
+    three_lines(done.err)
 
 
 @pytest.mark.parametrize("verb", ["scan", "fill", "recover", "convert"])
@@ -195,13 +207,22 @@ def start(*tokens: str, cwd: Path, **options: object) -> subprocess.Popen:
     )
 
 
-def test_a_broken_pipe_is_quiet(take):
-    process = start("scan", "take.bvh", "--json", cwd=take.parent)
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["scan", "take.bvh"],
+        ["scan", "take.bvh", "--json"],
+        ["fill", "take.bvh", "--gap", "60:70"],
+        ["fill", "--help"],
+    ],
+)
+def test_a_broken_pipe_is_quiet(take, command):
+    process = start(*command, cwd=take.parent)
     assert process.stdout is not None
     process.stdout.close()
     assert process.stderr is not None
     assert process.stderr.read() == ""
-    process.wait()
+    assert process.wait() == 0
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")

@@ -65,6 +65,57 @@ def test_existing_outputs_stay_without_force(run, take):
     assert take.with_name("take.filled.bvh").read_text().startswith("HIERARCHY")
 
 
+@pytest.mark.parametrize("options", [["--force"], []])
+def test_a_json_file_that_is_no_report_is_never_overwritten(run, take, options):
+    gaps = take.with_name("g2.json")
+    gaps.write_text('[{"frames": "60:80"}]')
+    labels = take.with_name("labels.json")
+    labels.write_text('{"gaps": [], "style": "walk"}')
+    before = gaps.read_bytes(), labels.read_bytes()
+    for name in ("g2.bvh", "labels.bvh"):
+        command = ["fill", "take.bvh", "--gaps", "g2.json", "-o", name, "--method", "linear", *options]
+        done = run(*command)
+        assert done.code == 2
+        assert len(done.err.splitlines()) == 3
+        assert name.replace("bvh", "json") in done.err
+        assert "That would end with" in run(*command, "--dry-run").out
+        assert not take.with_name(name).exists()
+    assert (gaps.read_bytes(), labels.read_bytes()) == before
+
+
+def test_a_report_may_be_replayed_in_place(run, take):
+    assert run("fill", "take.bvh", "--gap", "60:80", "--method", "linear").code == 0
+    before = take.with_name("take.filled.json").read_bytes()
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json").code == 2
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json", "--force").code == 0
+    assert take.with_name("take.filled.json").read_bytes() == before
+
+
+def test_a_report_is_not_mixed_with_other_gaps(run, take):
+    run("fill", "take.bvh", "--gap", "60:80", "--method", "linear")
+    for more in (["--gap", "50:55"], ["--gap", "50:55", "--joints", "LeftArm"], ["--joints", "LeftArm"]):
+        done = run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh", *more)
+        assert done.code == 2
+        assert len(done.err.splitlines()) == 3
+        assert "take.filled.json" in done.err or "--joints" in done.err
+    assert not take.with_name("again.bvh").exists()
+    take.with_name("gaps.json").write_text('[{"frames": "60:80"}]')
+    done = run(
+        "fill",
+        "take.bvh",
+        "--gaps",
+        "gaps.json",
+        "--gap",
+        "20:30",
+        "-o",
+        "both.bvh",
+        "--method",
+        "linear",
+        "--json",
+    )
+    assert [gap["frames"] for gap in done.json["gaps"]] == ["20:30", "60:80"]
+
+
 def test_the_input_is_never_overwritten(run, take):
     before = take.read_bytes()
     for verb in (
@@ -244,6 +295,19 @@ def test_convert(run, take):
     assert len(slow) == 82
     assert slow.fps == pytest.approx(15, abs=1e-3)
     assert run("convert", "take.bvh", "slow.bvh").code == 2
+
+
+@pytest.mark.parametrize("options", [[], ["--up", "z"]])
+def test_another_rate_keeps_the_layout(run, take, options):
+    assert run("convert", "take.bvh", "slow.bvh", "--fps", "15", *options).code == 0
+    old, new = take.read_text(), take.with_name("slow.bvh").read_text()
+    assert new.partition("MOTION")[0] == old.partition("MOTION")[0]
+    every_second = [line.split() for line in old.splitlines()[-163::2]]
+    kept = [line.split() for line in new.splitlines()[-82:]]
+    np.testing.assert_allclose(np.array(kept, float)[:, :3], np.array(every_second, float)[:, :3], atol=1e-3)
+    clip, slow = (load(take.with_name(name), up="z" if options else "y") for name in ("take.bvh", "slow.bvh"))
+    assert (slow.source.unit, slow.source.up) == (clip.source.unit, clip.source.up)
+    np.testing.assert_allclose(slow.positions(), clip.positions()[::2], atol=1e-4)
 
 
 def test_npz_in_npz_out(run, take):

@@ -17,6 +17,7 @@ from cyclopts import (
 )
 
 from interpose.cli import VERBS
+from interpose.cli.console import screen
 from interpose.errors import RequestError
 
 app = App(
@@ -36,6 +37,7 @@ def run(tokens: list[str]) -> int:
     try:
         code = app(
             tokens,
+            console=screen(),
             exit_on_error=False,
             print_error=False,
             help_on_error=False,

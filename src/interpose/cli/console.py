@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -20,13 +21,22 @@ LONG = 3000
 WIDE = 250
 
 
-def console(stderr: bool = False) -> Console:
-    """Made anew for every use, so that it goes where the stream goes now."""
+def screen(**options: Any) -> Console:
+    """A console of rich that leaves it to `main` what happens when the reader of a pipe has had enough."""
     from rich.console import Console
 
+    class Screen(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Screen(**options)
+
+
+def console(stderr: bool = False) -> Console:
+    """Made anew for every use, so that it goes where the stream goes now."""
     stream = sys.stderr if stderr else sys.stdout
     width = None if stream.isatty() or "COLUMNS" in os.environ else WIDE
-    return Console(stderr=stderr, highlight=False, markup=False, soft_wrap=True, width=width)
+    return screen(stderr=stderr, highlight=False, markup=False, soft_wrap=True, width=width)
 
 
 def say(text: str = "", style: str | None = None) -> None:
@@ -57,9 +67,9 @@ def say_table(columns: Sequence[str], rows: Iterable[Sequence[str]], right: Iter
         table.add_column(columns[i], justify="right" if is_number else "left", no_wrap=is_number)
     for row in rows:
         table.add_row(*(row[i] for i in used))
-    screen = console()
-    screen.soft_wrap = False  # cells wrap inside their column
-    screen.print(table)
+    out = console()
+    out.soft_wrap = False  # cells wrap inside their column
+    out.print(table)
 
 
 def seconds(frames: int, fps: float) -> str:
@@ -83,15 +93,15 @@ def progress(what: str, frames: int) -> Iterator[Callable[[float], None] | None]
     if frames < LONG:
         yield None
         return
-    screen = console(stderr=True)
-    if not screen.is_terminal:
-        screen.print(f"{what} ...")
+    errors = console(stderr=True)
+    if not errors.is_terminal:
+        errors.print(f"{what} ...")
         yield None
         return
     from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
     parts = TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn()
-    with Progress(*parts, console=screen, transient=True) as bar:
+    with Progress(*parts, console=errors, transient=True) as bar:
         task = bar.add_task(what, total=1.0)
         yield lambda share: bar.update(task, completed=share)
 
@@ -99,7 +109,9 @@ def progress(what: str, frames: int) -> Iterator[Callable[[float], None] | None]
 def complain(error: InterposeError) -> None:
     """An error on stderr: what, why and what to do, one line each."""
     first, *rest = (" ".join(line.split()) for line in (error.what, error.why, error.fix) if line)
-    screen = console(stderr=True)
-    screen.print(f"error: {first}", style="bold red")
+    errors = console(stderr=True)
+    errors.print(f"error: {first}", style="bold red")
     for line in rest:
-        screen.print(f"  {line}")
+        # In a terminal long lists break between words; lines for other programs stay whole.
+        width = errors.width if errors.is_terminal else len(line) + 2
+        errors.print(textwrap.fill(line, max(width, 20), initial_indent="  ", subsequent_indent="  "))

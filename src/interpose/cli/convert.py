@@ -24,8 +24,9 @@ def convert(
 ) -> None:
     """Write a clip in another format, or at another frame rate.
 
-    A BVH file that becomes one again at the same rate keeps its layout and every number's text. Else BVH is
-    written in centimetres, Y up. The suffix says the format: .bvh, .npz, .amc (for clips read from .amc).
+    A file that becomes one of its format again keeps its layout and units, and at the same rate every
+    number's text. Other BVH is written in centimetres, Y up. The suffix says the
+    format: .bvh, .npz, .amc (for clips read from .amc).
 
     Try:
       interpose convert take.bvh take.npz
@@ -46,7 +47,8 @@ def convert(
         raise RequestError(
             f"cannot write {output}", "it is the input, which stays as it is", "Choose another name."
         )
-    made = resample(clip, fps) if fps is not None else clip
+    # The layout of the file does not depend on the rate: units, axes and End Sites stay as they were.
+    made = replace(resample(clip, fps), source=clip.source) if fps is not None else clip
     notes = save(replace(made, name=output.stem), output, force=force)
     say("\n".join(describe(file, clip)))
     for note in notes:

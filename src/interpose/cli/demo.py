@@ -80,8 +80,9 @@ def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")
         right=("seam", "bones", "foot slide", "foot travel", "error"),
     )
     say(
-        "seam: largest velocity jump at the ends, cm/frame^2 (the clip's own 95th percentile is "
-        f"{filled.report.gaps[0].seam_limit or 0:.2f})\n"
+        "seam: largest velocity jump at the ends, cm/frame^2; the filled one has to stay below "
+        f"{filled.report.gaps[0].seam_limit or 0:.2f},\n"
+        "  under which 95 of 100 jumps of the clip itself are: real motion can be above\n"
         "bones: largest change of a length; error: mean distance of all joints from what was taken away",
         style="dim",
     )

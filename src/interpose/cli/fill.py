@@ -64,14 +64,15 @@ def fill(
         player: write a page (take.filled.html) that plays the result; it opens in any browser.
         dry_run: say what would be done, and write nothing.
         json: print the report as JSON.
-        force: replace existing files.
+        force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import from_options, reading_of
+    from interpose.cli.request import check_method, from_options, reading_of
 
     clip = reading_of(gaps, reading).load(file)
     request = from_options(file, clip, gap, joints, gaps)
     if method is not None:
+        check_method(method)
         request = replace(request, method=method, methods={})
     if only_gap:
         request = replace(request, only=only_gap, why={})
@@ -82,8 +83,8 @@ def fill(
         raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
     outputs = Outputs.choose(file, output, "filled", player)
     if dry_run:
-        return _dry_run(file, clip, request, max_gap, outputs, json, force)
-    outputs.check(file, force)
+        return _dry_run(file, clip, request, max_gap, outputs, json, force, gaps)
+    outputs.check(file, force, gaps)
     missing = sum(map(len, request.gaps))
     with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
         done = tasks.fill(
@@ -115,6 +116,7 @@ def _dry_run(
     outputs: Outputs,
     as_json: bool,
     force: bool,
+    gaps: Path | None,
 ) -> int:
     """Say what would be done."""
     from interpose import tasks
@@ -157,7 +159,7 @@ def _dry_run(
     say()
     say(f"a dry run: nothing is written. Without --dry-run: {', '.join(map(str, outputs.all))}")
     try:
-        outputs.check(file, force)
+        outputs.check(file, force, gaps)
     except RequestError as error:
         say(f"That would end with: {error.what}; {error.why}. {error.fix}")
     return 4 if left else 0

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
-from json import dumps
+from json import dumps, loads
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -50,8 +51,14 @@ class Outputs:
     def all(self) -> list[Path]:
         return [path for path in (self.clip, self.report, self.page) if path is not None]
 
-    def check(self, file: Path, force: bool) -> None:
-        """Before any work: RequestError if something is in the way."""
+    def check(self, file: Path, force: bool, gaps: Path | None = None) -> None:
+        """Before any work: RequestError if something is in the way.
+
+        Args:
+            file, gaps: the clip and the file of gaps that are read.
+            force: existing files may be replaced; of .json files only reports, as `-o NAME.bvh` does not
+                say that NAME.json is written, too.
+        """
         from interpose.formats import FORMATS
 
         if self.clip.suffix.lower() not in FORMATS:
@@ -70,10 +77,28 @@ class Outputs:
                 raise RequestError(what, "it is a directory", "Name a file in it with -o.")
             if not path.parent.is_dir():
                 raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
+            if path == self.report and path.exists() and not is_report(read_json(path)):
+                read = gaps is not None and gaps.exists() and path.samefile(gaps)
+                why = "it is the file of gaps, which stays as it is" if read else "it is no earlier report"
+                fix = "Choose another name with -o: --force replaces clips and reports, not other files."
+                raise RequestError(what, why, fix)
             if path.exists() and not force:
                 raise RequestError(
                     what, "the file exists already", "Choose another name with -o, or add --force."
                 )
+
+
+def read_json(path: Path) -> Any:
+    """What a JSON file holds, or None when there is nothing to be made of it."""
+    try:
+        return loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+def is_report(content: Any) -> bool:
+    """Whether what a file holds is a report that this program wrote, whole."""
+    return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()
 
 
 def write_text(path: Path, text: str) -> None:
@@ -207,19 +232,25 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
         right=("gap", "frames", "length", "seam", "bones", "slide", "travel", "drift"),
     )
     if gaps:
-        usual = (
-            f", the clip's own are below {gaps[0].seam_limit:.2f}" if gaps[0].seam_limit is not None else ""
-        )
-        legend = (
-            f"seam: largest velocity jump, cm/frame^2{usual}; bones: change of length, cm",
-            "slide, travel: of the feet, cm/s and m; drift: of the way before it was evened out, cm",
-        )
-        say("\n".join(legend), style="dim")
+        say("\n".join(_legend(gaps)), style="dim")
     for gap in gaps:
         for note in gap.notes:
             say(f"gap {gap.number}: {note}")
     for number, left in numbered(completion):
         say(f"gap {number} stays open: {left} ({seconds(len(left), fps)}), {why.get(number, 'not filled')}")
+
+
+def _legend(gaps: list[GapReport]) -> Iterator[str]:
+    """What the columns mean, of those that are there."""
+    if any(gap.seam_after is not None for gap in gaps):
+        limit = gaps[0].seam_limit
+        usual = "" if limit is None else f"; 95 of 100 of the clip's own are below {limit:.2f}"
+        yield f"seam: largest velocity jump at the ends, cm/frame^2{usual}"
+    yield "bones: largest change of a length, cm"
+    if any(gap.foot_slide is not None for gap in gaps):
+        yield "slide, travel: of the feet, cm/s and m"
+    if any(gap.drift is not None for gap in gaps):
+        yield "drift: of the way before it was evened out, cm"
 
 
 def _row(gap: GapReport, fps: float) -> list[str]:

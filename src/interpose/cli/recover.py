@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -11,6 +11,9 @@ from interpose.cli.console import progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
+
+if TYPE_CHECKING:
+    from interpose.observation import Gap
 
 
 def recover(
@@ -45,9 +48,10 @@ def recover(
         seed: for methods that sample.
         player: write a page (take.recovered.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
-        force: replace existing files.
+        force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
+    from interpose.cli.request import check_method
     from interpose.observation import Gap
 
     chosen = split_names(joints)
@@ -55,8 +59,9 @@ def recover(
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
+    check_method(method)
     clip = reading.load(file)
-    gap = Gap.parse(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
+    gap = _range(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
     for name in chosen:
         clip.skeleton.index(name)
@@ -65,3 +70,13 @@ def recover(
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
     return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
+
+
+def _range(text: str, joints: tuple[str, ...]) -> Gap:
+    from interpose.observation import Gap
+
+    try:
+        return Gap.parse(text, joints)
+    except RequestError as error:
+        fix = "Write --frames 120:160 for the frames 120 to 159."
+        raise RequestError(f"cannot read --frames {text}", error.why.replace("a gap", "it"), fix) from None

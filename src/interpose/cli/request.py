@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, unknown
 from interpose.observation import Gap
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import scan, to_gaps
@@ -50,9 +50,13 @@ def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], g
             why = "the file says which joints are missing"
             fix = 'Write "joints": ["LeftArm"] into its entries.'
             raise RequestError("--joints does not apply to --gaps", why, fix)
-        request = _replay(gaps)
-        if listed:
-            request = Request([*request.gaps, *listed])
+        filled = read_gaps(gaps)
+        content = read_json(gaps)
+        if is_report(content) and listed:
+            why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
+            fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."
+            raise RequestError("--gap does not go with a report", why, fix)
+        request = _replay(gaps, filled, content) if is_report(content) else Request([*filled, *listed])
     elif listed:
         request = Request(listed)
     elif chosen:
@@ -89,12 +93,8 @@ def _scanned(file: Path, clip: Clip) -> Request:
     return Request(gaps, said="\n".join(lines))
 
 
-def _replay(path: Path) -> Request:
-    """The gaps of a file; for a report, filled and open ones as they were, each by the method named in it."""
-    filled = read_gaps(path)
-    content = json.loads(path.read_text(encoding="utf-8"))
-    if not _is_report(content):
-        return Request(filled)
+def _replay(path: Path, filled: list[Gap], content: dict[str, Any]) -> Request:
+    """The gaps of a report, filled and open ones as they were, each by the method named in it."""
     left = content["open"]
     open_gaps = [
         Gap.parse(one["frames"], None if one["joints"] is None else tuple(one["joints"])) for one in left
@@ -116,11 +116,8 @@ def _replay(path: Path) -> Request:
 
 def reading_of(path: Path | None, reading: Reading) -> Reading:
     """How to read the clip: as told, or else as a report says that it was read."""
-    try:
-        content = json.loads(path.read_text(encoding="utf-8")) if path else None
-    except (OSError, ValueError, RecursionError):
-        return reading  # `from_options` says what is wrong with the file
-    if content is None or not _is_report(content):
+    content = read_json(path) if path else None  # `from_options` says what is wrong with the file
+    if content is None or not is_report(content):
         return reading
     kinds: dict[str, Any] = {
         "unit": str,
@@ -142,6 +139,10 @@ def reading_of(path: Path | None, reading: Reading) -> Reading:
     return replace(reading, **said)
 
 
-def _is_report(content: Any) -> bool:
-    """Whether a file is a report that this program wrote, whole."""
-    return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()
+def check_method(name: str) -> None:
+    """Raises RequestError listing all methods, auto among them, for a name that is none."""
+    from interpose.methods import registry
+
+    choices = list(dict.fromkeys(["auto", *registry.names()]))
+    if name not in choices:
+        raise unknown("method", name, choices)
