@@ -16,9 +16,9 @@ from interpose.errors import RequestError
 from interpose.finish import complete
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Pin
 
-METHODS = ("zero-velocity", "linear", "spline", "cae", "auto")
+METHODS = (*registry.names(), "auto")
 
 
 def _same(one: Clip, other: Clip, frames: slice) -> bool:
@@ -112,6 +112,39 @@ def test_auto_goes_by_length_and_by_what_the_network_can(cmu_walk):
 def _plan(clip, length):  # type: ignore[no-untyped-def]
     seen = Observation.from_gaps(clip, [Gap(60, 60 + length)])
     return tasks.plan(clip, seen, "auto", None, None, {})
+
+
+def test_a_lost_joint_does_not_keep_the_network_from_a_gap(long_walk):
+    """A whole pose is missing for a second, an arm all the time: the network fills both, piece by piece."""
+    gaps = [Gap(0, len(long_walk), ("LeftArm",)), Gap(595, 625)]
+    done = tasks.fill(long_walk, gaps, "cae")
+    assert {gap.method for gap in done.report.gaps} == {"cae"}
+    assert np.isfinite(done.clip.rotation).all()
+    (job,) = tasks.plan(long_walk, Observation.from_gaps(long_walk, gaps), "auto", 40, None, {})
+    assert job.method is not None, "a limit of 40 frames is meant for the gap of the whole pose"
+
+
+def test_auto_says_why_the_network_does_not_fill_a_long_gap(cmu_walk):
+    report = tasks.fill(cmu_walk, [Gap(40, 140)], "auto").report.gaps[0]
+    assert report.method == "spline"
+    assert "100 frames" in " ".join(report.notes)
+
+
+def test_pins_are_refused_rather_than_ignored(cmu_walk):
+    seen = Observation.from_gaps(cmu_walk, [Gap(60, 90)])
+    pinned = replace(seen, pins=(Pin("LeftHand", np.array([70]), np.zeros((1, 3))),))
+    with pytest.raises(RequestError, match="pins"):
+        complete(cmu_walk, pinned, registry.get("spline"))
+    with pytest.raises(RequestError, match="pins"):
+        tasks.fill(cmu_walk, pinned)
+
+
+def test_raw_is_what_the_network_said(cmu_walk):
+    raw = tasks.fill(cmu_walk, [Gap(60, 90)], "cae").raw
+    assert raw.positions is not None
+    assert raw.own is not None
+    assert np.isfinite(raw.positions[60:90]).all()
+    assert np.isnan(raw.positions[:60]).all()
 
 
 def test_too_long_for_the_network_is_filled_by_the_spline_and_said(cmu_walk):

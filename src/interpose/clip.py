@@ -118,7 +118,9 @@ class Clip:
         fill(self, "translation", np.asarray(self.translation, float))
         frames, joints = self.rotation.shape[0], len(self.skeleton)
         if self.rotation.shape != (frames, joints, 4):
-            raise RequestError("rotations do not fit", f"expected (F, {joints}, 4), got {self.rotation.shape}")
+            raise RequestError(
+                "rotations do not fit", f"expected (F, {joints}, 4), got {self.rotation.shape}"
+            )
         if self.translation.shape != (frames, len(self.translated), 3):
             raise RequestError(
                 "translations do not fit",
@@ -147,7 +149,9 @@ class Clip:
 
     def local_translation(self) -> np.ndarray:
         """(F, J, 3) local translations of all joints, scales of the joints above included."""
-        everything = np.broadcast_to(self.skeleton.rest_translation, (len(self), len(self.skeleton), 3)).copy()
+        everything = np.broadcast_to(
+            self.skeleton.rest_translation, (len(self), len(self.skeleton), 3)
+        ).copy()
         everything[:, list(self.translated)] = self.translation
         return everything * self.skeleton.scale_above[:, None]
 

@@ -37,5 +37,7 @@ def unknown(kind: str, name: object, choices: object) -> RequestError:
     near = difflib.get_close_matches(str(name), names, n=3, cutoff=0.5)
     hint = f"Did you mean {' or '.join(near)}? " if near else ""
     return RequestError(
-        f"unknown {kind}: {name}", f"it is none of: {', '.join(names)}", f"{hint}Choose one of the names above."
+        f"unknown {kind}: {name}",
+        f"it is none of: {', '.join(names)}",
+        f"{hint}Choose one of the names above.",
     )

@@ -15,6 +15,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, seams
+from interpose.finish.guarantees import check_pins
 from interpose.finish.windows import ramp, runs
 from interpose.geometry import rotations
 from interpose.methods import auto, registry
@@ -33,6 +34,7 @@ class Job:
     number: int
     gap: Gap
     method: Method | None  # None: it stays open
+    note: str | None = None
 
 
 def fill(
@@ -65,6 +67,7 @@ def fill(
         RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
+    check_pins(observation)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
             "there is nothing to go by",
@@ -74,7 +77,7 @@ def fill(
     jobs = plan(clip, observation, method, max_gap, only, methods or {})
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
-    raw = _RawClip(clip)
+    said: list[tuple[int, slice, Raw]] = []
     reports: list[GapReport] = []
     limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
     work = [(job, piece) for job in jobs if job.method for piece in _pieces(clip, observation, job.gap)]
@@ -89,14 +92,16 @@ def fill(
         known = observation.translation[:, list(clip.translated)]
         _paste(translation, part.clip.translation, known, start, inside, fade)
         provenance[start:stop] = part.provenance[inside]
-        raw.add(part.raw, start, inside)
-        reports += _shifted(part.report.gaps, lo, start, stop, job.number)
+        said.append((start, inside, part.raw))
+        reports += _shifted(part.report.gaps, lo, start, stop, job)
         if progress:
             progress((done + 1) / len(work))
     reports = _joined(reports)
     left = [job.gap for job in jobs if job.method is None]
     report = Report(method, reports, left)
-    return Completion(clip.with_motion(rotation, translation), raw.done(), provenance, report)
+    return Completion(
+        clip.with_motion(rotation, translation), lambda: _put_together(clip, said), provenance, report
+    )
 
 
 def recover(
@@ -134,10 +139,14 @@ def plan(
             )
     jobs = []
     for number, gap in enumerate(spans, 1):
-        open_ = (max_gap is not None and len(gap) > max_gap) or (only is not None and number not in only)
-        name = methods.get(number, method)
-        chosen = auto.choose(clip, gap) if name == "auto" else registry.get(name)
-        jobs.append(Job(number, gap, None if open_ else chosen))
+        lead = _lead(observation, gap)
+        open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
+        name, note = methods.get(number, method), None
+        if name == "auto":
+            chosen, note = auto.choose(clip, lead)
+        else:
+            chosen = registry.get(name)
+        jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
 
 
@@ -150,17 +159,31 @@ def _span(observation: Observation, clip: Clip, start: int, stop: int) -> Gap:
     return Gap(start, stop, tuple(clip.skeleton.names[j] for j in np.flatnonzero(lost.any(axis=0))))
 
 
+def _lead(observation: Observation, gap: Gap) -> Gap:
+    """What a method is chosen by: the longest stretch without any pose; without one, the whole gap."""
+    if gap.joints is not None:
+        return gap
+    empty = runs(np.logical_not(observation.rotation[gap.start : gap.stop].any(axis=1)))
+    start, stop = max(empty, key=lambda run: run[1] - run[0])
+    return Gap(gap.start + start, gap.start + stop)
+
+
 def _pieces(clip: Clip, observation: Observation, gap: Gap) -> Iterator[tuple[int, int]]:
-    """The gap itself; or, when single joints are missing for long, overlapping pieces of it."""
+    """The gap itself; or, when single joints are missing for long, overlapping pieces of it.
+
+    Where pieces overlap at least a part of every pose is known.
+    """
     piece, overlap = round(PIECE * clip.fps), round(OVERLAP * clip.fps)
-    if gap.joints is None or len(gap) <= piece:
-        yield gap.start, gap.stop
-        return
+    empty = np.logical_not(observation.rotation.any(axis=1))
     start = gap.start
-    while start + overlap < gap.stop or start == gap.start:
+    while True:
         stop = min(start + piece, gap.stop)
+        while stop < gap.stop and empty[stop - overlap : stop].any():
+            stop += 1
         yield start, stop
-        start = stop - overlap if stop < gap.stop else stop
+        if stop == gap.stop:
+            return
+        start = stop - overlap
 
 
 def _paste(
@@ -180,14 +203,13 @@ def _paste(
     whole[start:stop][missing] = values[missing]
 
 
-def _shifted(
-    reports: Iterable[GapReport], by: int, start: int, stop: int, number: int
-) -> Iterator[GapReport]:
+def _shifted(reports: Iterable[GapReport], by: int, start: int, stop: int, job: Job) -> Iterator[GapReport]:
     """The reports of a window that concern its own gap, counted in frames of the whole clip."""
     for one in reports:
         if one.start + by < stop and one.stop + by > start:
             first, last = max(one.start + by, start), min(one.stop + by, stop)
-            yield replace(one, start=first, stop=last, number=number)
+            notes = ((job.note,) if job.note else ()) + one.notes
+            yield replace(one, start=first, stop=last, number=job.number, notes=notes)
 
 
 def _joined(reports: list[GapReport]) -> list[GapReport]:
@@ -219,26 +241,17 @@ def _over(one: GapReport, other: GapReport, name: str, combine: Callable[..., fl
     return combine(a, b) if a is not None and b is not None else b if a is None else a
 
 
-class _RawClip:
-    """What the methods themselves said, put together for the whole clip."""
-
-    def __init__(self, clip: Clip) -> None:
-        self.clip = replace(
-            clip, rotation=clip.rotation.copy(), translation=clip.translation.copy(), source=None
-        )
-        self.positions: np.ndarray | None = None
-        self.joints: tuple[int, ...] = ()
-
-    def add(self, raw: Raw, start: int, inside: slice) -> None:
-        stop = start + inside.stop - inside.start
-        self.clip.rotation[start:stop] = raw.clip.rotation[inside]
-        self.clip.translation[start:stop] = raw.clip.translation[inside]
-        if raw.positions is not None:
-            if self.positions is None:
-                self.joints = raw.joints
-                self.positions = np.full((len(self.clip), len(raw.joints), 3), np.nan)
-            self.positions[start:stop] = raw.positions[inside]
-
-    def done(self) -> Raw:
-        """`positions` is NaN where no method spoke of positions."""
-        return Raw(self.clip, self.positions, self.joints)
+def _put_together(clip: Clip, said: list[tuple[int, slice, Raw]]) -> Raw:
+    """What the methods said in their windows, as one; positions are NaN where none spoke of them."""
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    joints = next((raw.joints for _, _, raw in said if raw.positions is not None), ())
+    shape = (len(clip), len(joints), 3)
+    positions, own = (np.full(shape, np.nan), np.full(shape, np.nan)) if joints else (None, None)
+    for start, inside, raw in said:
+        part = slice(start, start + inside.stop - inside.start)
+        rotation[part], translation[part] = raw.clip.rotation[inside], raw.clip.translation[inside]
+        for whole, spoken in ((positions, raw.positions), (own, raw.own)):
+            if whole is not None and spoken is not None:
+                whole[part] = spoken[inside]
+    whole_clip = replace(clip, rotation=rotation, translation=translation, source=None)
+    return Raw(whole_clip, positions, joints, own)

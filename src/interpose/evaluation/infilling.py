@@ -31,6 +31,7 @@ ROWS = (
     "spline, true trajectory",
     "spline, finished",
     "cae, true trajectory",
+    "cae, settled",
     "cae, finished",
 )
 
@@ -100,6 +101,10 @@ class Infilling:
             "solve_error": float(np.mean(self.solves)) if self.solves else None,
             "drift": {str(gap): float(np.mean(held)) for gap, held in self.drifts.items()},
             "fell_back": dict(self.fallen),
+            "targets": [
+                {"target": words, "value": value, "limit": limit, "met": good}
+                for words, value, limit, good in self.targets()
+            ],
         }
 
     def table(self, group: str = "all") -> str:
@@ -131,14 +136,45 @@ class Infilling:
             for group in self.errors
         ]
         drift = ", ".join(f"{np.mean(held):.1f} cm at {gap}" for gap, held in self.drifts.items())
+        checks = [
+            f"{'met   ' if good else 'missed'}  {words}: {value:.2f}, {limit}"
+            for words, value, limit, good in self.targets()
+        ]
         notes = [
             "Mean ± standard deviation of the joint error in cm (ratio to the paper's linear row).",
             "Feet: slide in cm/s, travel in m, speed in cm/s where the truth's feet stand.",
             f"Solve: {np.mean(self.solves):.2f} cm from the network's positions.",
             f"Root drift before correction: {drift}.",
-            f"Fell back to the spline: {dict(self.fallen) or 'never'}.",
+            f"Fell back to the spline (by gap length): {dict(self.fallen)}.",
         ]
-        return "\n\n".join([*parts, self.feet_table(), "\n".join(notes)])
+        return "\n\n".join([*parts, self.feet_table(), "\n".join(notes), "\n".join(checks)])
+
+    def targets(self) -> list[tuple[str, float, str, bool]]:
+        """What the network is meant to reach: in words, the figure, its limit, whether it is met."""
+        found = []
+        for frames, most in ((30, 0.75), (60, 0.65)):
+
+            def mean(row: str, frames: int = frames) -> float:
+                figures = self.mean("all", row, frames)
+                return figures[0] if figures else float("nan")
+
+            ours, finished = mean("cae, true trajectory"), mean("cae, finished")
+            rivals = min(mean("linear, true trajectory"), mean("spline, true trajectory"))
+            spline, settled = mean("spline, finished"), mean("cae, settled")
+            feet, truth = self.foot("cae, finished", frames), self.foot("truth", frames)
+            figures = (
+                ("network to the paper's linear row", ours / mean(PAPER), most, True),
+                ("network to the better of linear and spline, true trajectory", ours / rivals, 1.0, True),
+                ("finished to spline finished", finished / spline, 1.0, True),
+                ("finished to what the network settled on", finished / settled, 1.05, True),
+                ("foot slide to the truth's", feet["slide"] / truth["slide"], 1.2, True),
+                ("foot travel to the truth's", feet["travel"] / truth["travel"], 0.8, False),
+            )
+            for words, value, limit, below in figures:
+                good = value <= limit if below else value >= limit
+                sign = "at most" if below else "at least"
+                found.append((f"{frames} frames, {words}", value, f"{sign} {limit:g}", good))
+        return found
 
 
 def run(
@@ -171,8 +207,8 @@ def _measure(result: Infilling, window: Window, frames: int) -> None:
     network = registry.get("cae")
     if frames == 0:
         raw = network.complete(window.clip, hidden)
-        assert raw.positions is not None
-        result.add(window, "cae, true trajectory", gap, 0, window.on_true_way(_spoken(window, raw.positions)))
+        assert raw.own is not None
+        result.add(window, "cae, true trajectory", gap, 0, window.on_true_way(_spoken(window, raw.own)))
         return
     wiped = wipe(window.clip, hidden)
     for name in ("zero-velocity", "linear"):
@@ -183,13 +219,14 @@ def _measure(result: Infilling, window: Window, frames: int) -> None:
     for name in ("spline", "cae"):
         completion = complete(window.clip, hidden, registry.get(name))
         raw = completion.raw
-        said = window.canonical(raw.clip) if raw.positions is None else _spoken(window, raw.positions)
+        said = window.canonical(raw.clip) if raw.own is None else _spoken(window, raw.own)
         result.add(window, f"{name}, true trajectory", gap, frames, window.on_true_way(said))
         result.add(window, f"{name}, finished", gap, frames, window.canonical(completion.clip))
         _feet(result, window, completion.clip, hidden, gap, f"{name}, finished")
-        if name == "cae":
+        if raw.positions is not None:
+            result.add(window, "cae, settled", gap, frames, _spoken(window, raw.positions))
             (report,) = completion.report.gaps
-            result.fallen[frames] += report.method != name
+            result.fallen[frames] += int(report.method != name)
             result.solves += [report.solve_error] if report.solve_error is not None else []
             result.drifts[frames] += [report.drift] if report.drift is not None else []
     _feet(result, window, window.clip, hidden, gap, "truth")

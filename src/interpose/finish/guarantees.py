@@ -74,7 +74,7 @@ def complete(
             of a longer one. Default: the 95th percentile of the clip's own.
 
     Raises:
-        RequestError: the observation does not fit the clip, or nothing fills a gap.
+        RequestError: the observation does not fit the clip or has pins, or nothing fills a gap.
     """
     if observation.rotation.shape != clip.rotation.shape[:2]:
         raise RequestError(
@@ -83,11 +83,14 @@ def complete(
             "Make it from the same clip, for example with Observation.from_gaps.",
         )
     fallback = fallback or Spline()
+    check_pins(observation)
     hidden = wipe(clip, observation)
     known = _trusted(hidden, observation)
     gaps = known.gaps(clip.skeleton)
     if not gaps:
-        return Completion(clip, Raw(clip), np.zeros(known.rotation.shape, np.int8), Report(method.name))
+        return Completion(
+            clip, lambda: Raw(clip), np.zeros(known.rotation.shape, np.int8), Report(method.name)
+        )
 
     spans = [_Span(start, stop, method.name) for start, stop in runs(~known.frames)]
     for gap in gaps:
@@ -168,7 +171,17 @@ def complete(
         for gap in gaps
     ]
     provenance = _provenance(known, spans, method.name, opinion, finished)
-    return Completion(finished, raw, provenance, Report(method.name, reports))
+    return Completion(finished, lambda: raw, provenance, Report(method.name, reports))
+
+
+def check_pins(observation: Observation) -> None:
+    """RequestError when there are pins: better refused than passed over."""
+    if observation.pins:
+        raise RequestError(
+            "pins cannot be met yet",
+            "no method that is here knows how to meet a global position",
+            "Leave the pins out; what is observed of rotations and of the root is kept exactly.",
+        )
 
 
 def wipe(clip: Clip, observation: Observation) -> Clip:
@@ -294,8 +307,12 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _
 
 def _plant(current: Clip, known: Observation, span: _Span) -> None:
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    held = feet.plant(current.slice(lo, hi), known.slice(lo, hi), inner)
-    _write(current, held, span.start, inner)
+    loose, seen = current.slice(lo, hi), known.slice(lo, hi)
+    held = feet.plant(loose, seen, inner)
+    slides = [feet.measure(clip, seen, *inner) for clip in (loose, held)]
+    # Where holding feet made them slide, it was about something else than stances.
+    if slides[0] and slides[1] and slides[1][0] <= slides[0][0]:
+        _write(current, held, span.start, inner)
 
 
 def _soften(current: Clip, known: Observation, span: _Span, limit: float | None) -> None:

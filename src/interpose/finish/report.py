@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -65,13 +67,14 @@ class GapReport:
         where = f"{self.start}:{self.stop}"
         if self.joints is not None:
             where += " " + ",".join(self.joints[:4]) + (",..." if len(self.joints) > 4 else "")
-        parts = [f"by {self.method}" + (f" ({self.model})" if self.model else "")]
+        named = self.model and self.model != self.method
+        parts = [f"by {self.method}" + (f" ({self.model})" if named else "")]
         if self.solve_error is not None:
             parts.append(f"solved within {self.solve_error:.2f} cm")
         if self.seam_after is not None:
             above = f" (limit {self.seam_limit:.2f})" if self.seam_limit is not None else ""
             parts.append(f"seam {self.seam_before:.2f} -> {self.seam_after:.2f}{above} cm/frame^2")
-        parts.append(f"bones within {self.bone_deviation:.2g} cm")
+        parts.append(f"bones within {self.bone_deviation:.2f} cm")
         if self.foot_slide is not None:
             parts.append(f"feet slide {self.foot_slide:.1f} cm/s, travel {self.foot_travel:.2f} m")
         if self.drift is not None:
@@ -103,15 +106,20 @@ class Completion:
 
     Attributes:
         clip: the finished clip.
-        raw: what the method itself said, before anything was corrected (what papers' tables use).
+        said: gives `raw`; of a long clip it is put together only when somebody asks.
         provenance: (F, J) int8, codes of `Provenance`.
         report: a report per gap.
     """
 
     clip: Clip
-    raw: Raw
-    provenance: np.ndarray
+    said: Callable[[], Raw] = field(repr=False)
+    provenance: np.ndarray = field(repr=False)
     report: Report
+
+    @cached_property
+    def raw(self) -> Raw:
+        """What the method itself said, before anything was corrected (what papers' tables use)."""
+        return self.said()
 
 
 def _plain(value: Any) -> Any:

@@ -36,8 +36,7 @@ def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.nda
     The end is padded to the network's multiple by repeating the last frame, and cropped again.
 
     Returns:
-        Completed positions (B, T, 22, 3) float64, on the network's own trajectory and on the one with its
-        drift taken out.
+        Positions (B, T, 22, 3) float64: the network's own, and settled into what is observed.
     """
     length = positions.shape[1]
     frames = np.minimum(np.arange(-(-length // MULTIPLE) * MULTIPLE), length - 1)
@@ -102,10 +101,11 @@ class Cae:
         drift = self._drift(observation, raw, completed, times, mapping)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
-        spoken = sample_smooth(completed, back) / mapping.scale
+        spoken, own = (sample_smooth(out, back) / mapping.scale for out in (completed, raw))
         canonical = [i for i, joint in enumerate(mapping.joints) if joint is not None]
         joints = tuple(int(mapping.joints[i]) for i in canonical)  # type: ignore[arg-type]
-        return Raw(base, spoken[:, canonical], joints, {"model": card.name, "drift": drift})
+        notes = {"model": card.name, "drift": drift}
+        return Raw(base, spoken[:, canonical], joints, own[:, canonical], notes)
 
     def _drift(
         self,
