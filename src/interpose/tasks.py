@@ -254,4 +254,4 @@ def _put_together(clip: Clip, said: list[tuple[int, slice, Raw]]) -> Raw:
             if whole is not None and spoken is not None:
                 whole[part] = spoken[inside]
     whole_clip = replace(clip, rotation=rotation, translation=translation, source=None)
-    return Raw(whole_clip, positions, joints, own)
+    return Raw(whole_clip, positions, joints, own=own)

@@ -105,7 +105,7 @@ class Cae:
         canonical = [i for i, joint in enumerate(mapping.joints) if joint is not None]
         joints = tuple(int(mapping.joints[i]) for i in canonical)  # type: ignore[arg-type]
         notes = {"model": card.name, "drift": drift}
-        return Raw(base, spoken[:, canonical], joints, own[:, canonical], notes)
+        return Raw(base, spoken[:, canonical], joints, notes, own[:, canonical])
 
     def _drift(
         self,

@@ -24,16 +24,16 @@ class Raw:
         positions: (F, J, 3) global joint positions for methods that speak positions, on the joints in
             `joints`; None for methods that speak rotations.
         joints: indices of the joints that `positions` speaks of.
+        notes: what a report should say (drift of the root trajectory, model, ...).
         own: (F, J, 3) what a network itself says, before it is settled into what is observed: the papers'
             tables use it. None where `positions` is that already.
-        notes: what a report should say (drift of the root trajectory, model, ...).
     """
 
     clip: Clip
     positions: np.ndarray | None = None
     joints: tuple[int, ...] = ()
-    own: np.ndarray | None = None
     notes: dict[str, Any] = field(default_factory=dict)
+    own: np.ndarray | None = None
 
 
 class Method(Protocol):
