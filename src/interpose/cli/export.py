@@ -20,27 +20,25 @@ def cae(
     run: Path,
     packs: Path = Path("packs"),
     out: Path = Path("weights/cae"),
-    budget: str = "",
     splits: list[str] = [],  # noqa: B006
 ) -> None:
     """Write cae.onnx, its card cae.json, and the training log with its curves.
 
     Try:
-      interpose export cae --run runs/cae --packs packs --out weights/cae --budget 25m
+      interpose export cae --run runs/cae --packs packs --out weights/cae
 
     Args:
         run: the folder of the training run.
         packs: the folder with the packs that it was trained on.
         out: the folder for the weights.
-        budget: what the run was given; the card says it.
         splits: what it was trained on: train (the default), or train,validation.
     """
     with needs_torch("export a network"):
         from interpose.training.export import export_cae
     chosen = check_splits(splits)
-    for name in ("averaged.pt", "log.jsonl"):
+    for name in ("averaged.pt", "log.jsonl", "settings.json"):
         if not (run / name).is_file():
             raise FileError(f"cannot export {run}", f"it has no {name}", "Train first: interpose train cae.")
-    card = export_cae(run, load_packs(packs), out, {"budget": budget} if budget else {}, list(chosen))
+    card = export_cae(run, load_packs(packs), out, list(chosen))
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")
     say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")

@@ -208,7 +208,7 @@ def _measure(result: Infilling, window: Window, frames: int) -> None:
     if frames == 0:
         raw = network.complete(window.clip, hidden)
         assert raw.own is not None
-        result.add(window, "cae, true trajectory", gap, 0, window.on_true_way(_spoken(window, raw.own)))
+        result.add(window, "cae, true trajectory", gap, 0, window.placed(_spoken(window, raw.own)))
         return
     wiped = wipe(window.clip, hidden)
     for name in ("zero-velocity", "linear"):
@@ -219,8 +219,12 @@ def _measure(result: Infilling, window: Window, frames: int) -> None:
     for name in ("spline", "cae"):
         completion = complete(window.clip, hidden, registry.get(name))
         raw = completion.raw
-        said = window.canonical(raw.clip) if raw.own is None else _spoken(window, raw.own)
-        result.add(window, f"{name}, true trajectory", gap, frames, window.on_true_way(said))
+        said = (
+            window.on_true_way(window.canonical(raw.clip))
+            if raw.own is None
+            else window.placed(_spoken(window, raw.own))
+        )
+        result.add(window, f"{name}, true trajectory", gap, frames, said)
         result.add(window, f"{name}, finished", gap, frames, window.canonical(completion.clip))
         _feet(result, window, completion.clip, hidden, gap, f"{name}, finished")
         if raw.positions is not None:

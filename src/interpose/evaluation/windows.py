@@ -44,7 +44,10 @@ class Window:
 
         So a trajectory does not count, as in Kaufmann et al. 2020, table 1 ("poses are root aligned").
         """
-        body = turn(positions - _floor(positions), -facing(positions)[:, None])
+        return self.placed(turn(positions - _floor(positions), -facing(positions)[:, None]))
+
+    def placed(self, body: np.ndarray) -> np.ndarray:
+        """Poses (T, 22, 3) in the body's frame, laid on the true trajectory."""
         return turn(body, facing(self.positions)[:, None]) + _floor(self.positions)
 
 

@@ -30,13 +30,14 @@ def session(path: Path) -> Any:
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 
-def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run the graph on (B, T, 22, 3) metres of a canonical leg at 30 fps and (B, T, 22) booleans, any T.
 
     The end is padded to the network's multiple by repeating the last frame, and cropped again.
 
     Returns:
-        Positions (B, T, 22, 3) float64: the network's own, and settled into what is observed.
+        Positions (B, T, 22, 3) float64: the network's own poses in the body's frame, the same on its own
+        trajectory, and settled into what is observed.
     """
     length = positions.shape[1]
     frames = np.minimum(np.arange(-(-length // MULTIPLE) * MULTIPLE), length - 1)
@@ -48,8 +49,8 @@ def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.nda
         "positions": (positions - origin)[:, frames].astype(np.float32),
         "observed": np.ascontiguousarray(observed[:, frames]),
     }
-    raw, completed = session(path).run(None, feed)
-    return raw[:, :length].astype(float) + origin, completed[:, :length].astype(float) + origin
+    body, raw, completed = (out[:, :length].astype(float) for out in session(path).run(None, feed))
+    return body, raw + origin, completed + origin
 
 
 class Cae:
@@ -97,11 +98,11 @@ class Cae:
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         seen = known[before] & known[after]
-        raw, completed = (out[0] for out in run(card.onnx, sample(positions, times)[None], seen[None]))
+        body, raw, completed = (out[0] for out in run(card.onnx, sample(positions, times)[None], seen[None]))
         drift = self._drift(observation, raw, completed, times, mapping)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
-        spoken, own = (sample_smooth(out, back) / mapping.scale for out in (completed, raw))
+        spoken, own = (sample_smooth(out, back) / mapping.scale for out in (completed, body))
         canonical = [i for i, joint in enumerate(mapping.joints) if joint is not None]
         joints = tuple(int(mapping.joints[i]) for i in canonical)  # type: ignore[arg-type]
         notes = {"model": card.name, "drift": drift}

@@ -25,8 +25,8 @@ class Raw:
             `joints`; None for methods that speak rotations.
         joints: indices of the joints that `positions` speaks of.
         notes: what a report should say (drift of the root trajectory, model, ...).
-        own: (F, J, 3) what a network itself says, before it is settled into what is observed: the papers'
-            tables use it. None where `positions` is that already.
+        own: (F, J, 3) a network's own poses in the body's frame (hips over the origin, facing along Z),
+            before they are settled into what is observed: the papers' tables lay them on the true way.
     """
 
     clip: Clip

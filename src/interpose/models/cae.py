@@ -221,7 +221,7 @@ class Infiller(nn.Module):
         masked = torch.where(image.known, (image.rows - self.mean) / self.std, 0.0)
         return self.network(masked[:, None])[:, 0]
 
-    def forward(self, positions: Tensor, observed: Tensor) -> tuple[Tensor, Tensor]:
+    def forward(self, positions: Tensor, observed: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Complete a motion.
 
         Args:
@@ -229,23 +229,23 @@ class Infiller(nn.Module):
             observed: (B, T, 22) booleans.
 
         Returns:
-            Positions (B, T, 22, 3) twice. First the network's own output: its poses, also where they are
-            observed, on its own trajectory, which drifts. Then the same settled into what is observed, with
-            the drift taken out.
+            Positions (B, T, 22, 3) three times. The network's own poses, also where they are observed, in
+            the body's frame: hips over the origin, facing along Z, heights as they are. The same on the
+            network's own trajectory, which drifts. And settled into what is observed, with the drift taken
+            out.
         """
         positions = torch.where(observed[..., None], positions, 0.0)
         image = to_image(positions, observed)
         rows = self.predict(image) * self.std + self.mean
-        raw, completed = (
-            self._place(some, image, correct)
-            for some, correct in ((rows, False), (settle(rows, image), True))
-        )
-        return raw, completed
+        up = positions.new_tensor([0.0, 1.0, 0.0])
+        body = self._body(rows) + image.floor[:, None, None, None] * up
+        return body, self._place(rows, image, False), self._place(settle(rows, image), image, True)
 
     @staticmethod
-    def _place(rows: Tensor, image: Image, correct: bool) -> Tensor:
+    def _body(rows: Tensor) -> Tensor:
+        return rows[:, : 3 * len(JOINTS)].transpose(1, 2).unflatten(2, (len(JOINTS), 3))
+
+    def _place(self, rows: Tensor, image: Image, correct: bool) -> Tensor:
         """Global positions (B, T, 22, 3) of rows, on the trajectory that they describe."""
-        rows = rows.transpose(1, 2)
-        body = rows[..., : 3 * len(JOINTS)].unflatten(2, (len(JOINTS), 3))
-        root, yaw = integrate(rows[..., 3 * len(JOINTS) :], image, correct)
-        return turn(body, yaw[..., None]) + root[..., None, :]
+        root, yaw = integrate(rows[:, 3 * len(JOINTS) :].transpose(1, 2), image, correct)
+        return turn(self._body(rows), yaw[..., None]) + root[..., None, :]

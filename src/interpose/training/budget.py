@@ -44,6 +44,9 @@ class Budget:
             return cls(None, int(float(match[1])))
         return cls(float(match[1]) * {"s": 1, "m": 60, "h": 3600}[match[2]], None)
 
+    def __str__(self) -> str:
+        return f"{self.steps} steps" if self.steps is not None else f"{(self.seconds or 0) / 3600:g} h"
+
     def start(self, gpu: bool) -> None:
         self.gpu, self._before = gpu, self.spent_seconds
         self._start = time.monotonic() if gpu else time.process_time()

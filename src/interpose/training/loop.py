@@ -7,9 +7,10 @@ import json
 import math
 import os
 import pickle
+import subprocess
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
@@ -50,6 +51,16 @@ class Settings:
     average: float = 0.999
     seed: int = 1
     every_seconds: float = 300.0
+
+
+def commit() -> str:
+    """The commit of the code that trains, when it lies in a repository."""
+    try:
+        asked = ["git", "rev-parse", "--short", "HEAD"]
+        answer = subprocess.run(asked, capture_output=True, text=True, check=True, cwd=Path(__file__).parent)
+        return answer.stdout.strip()
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
 
 
 class Trainer:
@@ -129,6 +140,10 @@ class Trainer:
 
     def run(self) -> nn.Module:
         """Train until the budget is spent; the averaged model comes back."""
+        if rank() == 0:
+            kept = {**asdict(self.settings), "budget": str(self.budget), "processes": processes()}
+            kept["commit"] = commit()
+            (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
         self.budget.start(gpu=self.device.type == "cuda")
         told, losses = time.monotonic() - self.settings.every_seconds * 0.8, []
         while self.budget.fraction < 1:
