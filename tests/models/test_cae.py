@@ -10,7 +10,7 @@ import pytest
 torch = pytest.importorskip("torch")
 
 from interpose.geometry.ground import turn  # noqa: E402
-from interpose.methods.cae import run  # noqa: E402
+from interpose.methods.cae import LENGTH, run, run_long, starts  # noqa: E402
 from interpose.models.cae import Autoencoder, Infiller, integrate, neighbours, settle, to_image  # noqa: E402
 from interpose.skeletons import JOINTS, SIDES, find_mapping  # noqa: E402
 from interpose.training.deconvolution import quicken  # noqa: E402
@@ -204,9 +204,8 @@ def test_graph_agrees_with_torch_at_odd_lengths(graph, walk, frames):
     positions = torch.cat([walk, walk], dim=1)[:, :frames].float()
     observed = torch.ones(positions.shape[:-1], dtype=torch.bool)
     observed[:, 40:70] = False
-    padded = torch.clamp(torch.arange(-(-frames // 32) * 32), max=frames - 1)
     with torch.no_grad():
-        theirs = [out[:, :frames].numpy() for out in model(positions[:, padded], observed[:, padded])]
+        theirs = [out.numpy() for out in model(positions, observed)]
     mine = run(path, positions.numpy().astype(float), observed.numpy())
     assert all(np.abs(a - b).max() < 1e-4 for a, b in zip(mine, theirs))
 
@@ -238,3 +237,29 @@ def test_quick_deconvolution_is_the_same_deconvolution():
     assert (outputs[0] - outputs[1]).abs().mean() < 0.03 * scale
     cosine = torch.nn.functional.cosine_similarity(gradients[0], gradients[1], dim=0)
     assert cosine > 0.99
+
+
+def test_windows_lie_around_what_is_missing():
+    complete = np.ones(1000, bool)
+    complete[[*range(300, 330), *range(990, 1000)]] = False
+    assert starts(complete).tolist() == [315 - LENGTH // 2, 1000 - LENGTH]
+    complete[400:800] = False
+    covered = np.zeros(1000, bool)
+    for start in starts(complete):
+        covered[start : start + LENGTH] = True
+    assert covered[~complete].all()
+    assert starts(np.ones(1000, bool)).tolist() == []
+
+
+def test_a_long_motion_is_completed_window_by_window(graph, walk):
+    """One gap of a long motion is what its window says; observed poses come back, wherever a window is."""
+    path, _ = graph
+    there = walk[0].numpy()
+    motion = np.concatenate([there, there[::-1], there])
+    observed = np.ones(motion.shape[:-1], bool)
+    observed[200:230] = False
+    whole = run_long(path, motion, observed)[2]
+    part = slice(215 - LENGTH // 2, 215 + LENGTH // 2)
+    alone = run(path, motion[None, part], observed[None, part])[2][0]
+    assert np.abs(whole[part] - alone).max() < 1e-6
+    assert np.abs((whole - motion)[observed]).max() < 1e-4

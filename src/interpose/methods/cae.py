@@ -16,7 +16,11 @@ from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons import Mapping, find_mapping
 
-MULTIPLE = 32  # frames: five times halved
+# Frames that the network was trained on. It learns where in its window it is, so it gets no other length:
+# with 128 frames it does a quarter worse.
+LENGTH = 120
+STEP = 60  # frames between the windows that cover what is missing for longer
+LONGEST = 90  # frames, the longest run that one window holds with enough of the motion around it
 
 
 @cache
@@ -33,24 +37,65 @@ def session(path: Path) -> Any:
 def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run the graph on (B, T, 22, 3) metres of a canonical leg at 30 fps and (B, T, 22) booleans, any T.
 
-    The end is padded to the network's multiple by repeating the last frame, and cropped again.
-
     Returns:
         Positions (B, T, 22, 3) float64: the network's own poses in the body's frame, the same on its own
         trajectory, and settled into what is observed.
     """
-    length = positions.shape[1]
-    frames = np.minimum(np.arange(-(-length // MULTIPLE) * MULTIPLE), length - 1)
     # Far from the origin float32 would lose millimetres: the graph sees the body near it.
     origin = np.zeros((len(positions), 1, 1, 3))
     for i, known in enumerate(observed[..., 0]):
         origin[i, 0, 0, [0, 2]] = positions[i, np.argmax(known), 0, [0, 2]]
     feed = {
-        "positions": (positions - origin)[:, frames].astype(np.float32),
-        "observed": np.ascontiguousarray(observed[:, frames]),
+        "positions": (positions - origin).astype(np.float32),
+        "observed": np.ascontiguousarray(observed),
     }
-    body, raw, completed = (out[:, :length].astype(float) for out in session(path).run(None, feed))
+    body, raw, completed = (out.astype(float) for out in session(path).run(None, feed))
     return body, raw + origin, completed + origin
+
+
+def starts(complete: np.ndarray) -> np.ndarray:
+    """First frames of the windows for a motion of which frames (T,) are complete.
+
+    One around the middle of every incomplete run; several, evenly spread, for a long one.
+    """
+    last = max(len(complete) - LENGTH, 0)
+    edges = np.flatnonzero(np.diff(np.concatenate([[True], complete, [True]]).astype(int)))
+    chosen: set[int] = set()
+    for start, stop in edges.reshape(-1, 2):
+        count = 1 if stop - start <= LONGEST else 1 + -(-(stop - start - LONGEST) // STEP)
+        middles = np.linspace(start, stop, 2 * count + 1)[1::2]
+        chosen |= {int(np.clip(round(middle - LENGTH / 2), 0, last)) for middle in middles}
+    return np.array(sorted(chosen), int)
+
+
+def run_long(
+    path: Path, positions: np.ndarray, observed: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`run` on one motion (T, 22, 3) of any length, in windows of the length that the network knows.
+
+    Where windows overlap they are blended, each fading towards its ends. A short motion repeats its last
+    pose, as in training. Frames that no window holds come back as they are; a complete motion is
+    reconstructed as a whole.
+    """
+    length = len(positions)
+    complete = observed.all(axis=1)
+    first = starts(complete & ~complete.all())
+    inside = first[:, None] + np.arange(LENGTH)
+    frames = np.minimum(inside, length - 1)
+    outputs = run(path, positions[frames], observed[frames])
+    weight = np.minimum(np.arange(1, LENGTH + 1), np.arange(LENGTH, 0, -1)) ** 3.0
+    sums = [np.zeros((length, *positions.shape[1:])) for _ in outputs]
+    total = np.zeros(length)
+    for i, real in enumerate(inside < length):
+        total[inside[i, real]] += weight[real]
+        for whole, out in zip(sums, outputs):
+            whole[inside[i, real]] += weight[real, None, None] * out[i, real]
+    held = total > 0
+    body, raw, completed = (
+        np.where(held[:, None, None], whole / np.where(held, total, 1.0)[:, None, None], positions)
+        for whole in sums
+    )
+    return body, raw, completed
 
 
 class Cae:
@@ -98,7 +143,7 @@ class Cae:
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         seen = known[before] & known[after]
-        body, raw, completed = (out[0] for out in run(card.onnx, sample(positions, times)[None], seen[None]))
+        body, raw, completed = run_long(card.onnx, sample(positions, times), seen)
         drift = self._drift(observation, raw, completed, times, mapping)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)

@@ -34,7 +34,7 @@ class Autoencoder(nn.Module):
             for a, b in zip(into, channels)
         )
         self.decoder = nn.ModuleList(
-            nn.ModuleList([nn.ConvTranspose2d(b, b, 3, 2, 1), nn.ConvTranspose2d(b, a, 3, 1, 1)])
+            nn.ModuleList([nn.ConvTranspose2d(b, b, 3, 2, 1, 1), nn.ConvTranspose2d(b, a, 3, 1, 1)])
             for a, b in zip(reversed((1, *channels[:-1])), reversed(channels))
         )
         # Xavier as in the paper; the gain of its leaky ReLU keeps a deep stack from fading out at the start.
@@ -53,7 +53,9 @@ class Autoencoder(nn.Module):
             sizes.append(x.shape[-2:])
             x = functional.max_pool2d(x, 2, ceil_mode=True)
         for i, (first, second) in enumerate(self.decoder):
-            x = second(functional.leaky_relu(first(x, output_size=sizes[-1 - i])))
+            height, width = sizes[-1 - i]
+            # Twice the size, less the last row or column where pooling had rounded up.
+            x = second(functional.leaky_relu(first(x)[..., :height, :width]))
             if i < len(self.decoder) - 1:
                 x = functional.leaky_relu(x)
         return x

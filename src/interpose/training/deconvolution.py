@@ -47,9 +47,9 @@ def quicken(model: nn.Module) -> None:
     for module in model.modules():
         if isinstance(module, nn.ConvTranspose2d) and module.stride == (2, 2):
 
-            def forward(x: Tensor, output_size: list[int], module: nn.ConvTranspose2d = module) -> Tensor:
+            def forward(x: Tensor, module: nn.ConvTranspose2d = module) -> Tensor:
                 assert module.bias is not None
-                y = _Deconvolution.apply(x, module.weight, 2, output_size)
+                y = _Deconvolution.apply(x, module.weight, 2, [2 * n for n in x.shape[-2:]])
                 return y + module.bias.to(y.dtype)[:, None, None]
 
             module.forward = forward

@@ -30,15 +30,12 @@ OPEN = "any use: trained on CMU data alone"
 
 
 def export_onnx(model: Infiller, path: Path) -> None:
-    """Write the whole method as one graph, for any number of clips and any multiple of 32 frames.
+    """Write the whole method as one graph, for any number of clips and frames.
 
     Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits.
     """
-    positions, observed = torch.randn(2, 64, len(JOINTS), 3), torch.rand(2, 64, len(JOINTS)) > 0.2
-    sizes = {
-        0: torch.export.Dim("clips", min=1, max=4096),
-        1: 32 * torch.export.Dim("blocks", min=1, max=8192),
-    }
+    positions, observed = torch.randn(2, 97, len(JOINTS), 3), torch.rand(2, 97, len(JOINTS)) > 0.2
+    sizes = {0: torch.export.Dim("clips", min=1, max=4096), 1: torch.export.Dim("frames", min=2, max=262144)}
     program = torch.onnx.export(
         model.eval().cpu(),
         (positions, observed),
