@@ -19,7 +19,7 @@ from interpose.show import Take, player, strip
 PICTURES = {
     "walk": ("16/16_22.bvh", (35, 65), "A walk that veers"),
     "jump": ("49/49_02.bvh", (60, 90), "A jump"),
-    "change": ("49/49_02.bvh", (180, 210), "A change of motion"),
+    "change": ("49/49_02.bvh", (215, 245), "A change of motion"),
 }
 
 

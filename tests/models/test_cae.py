@@ -131,7 +131,7 @@ def test_what_is_always_wrong_by_as_much_is_set_right(walk, gap):
         image.rows
         + torch.linspace(-0.1, 0.1, 69, dtype=walk.dtype)[:, None] * (torch.arange(69) < 68)[:, None]
     )
-    assert torch.allclose(settle(rows, image)[..., 1:], image.rows[..., 1:], atol=1e-9)
+    assert torch.allclose(settle(rows, image)[..., 1:], image.rows[..., 1:], atol=1e-6)
 
 
 def test_known_rows_are_taken_as_observed_and_met_without_a_jump(walk, gap):
@@ -140,7 +140,7 @@ def test_known_rows_are_taken_as_observed_and_met_without_a_jump(walk, gap):
     settled = settle(image.rows + slow, image)
     assert torch.equal(settled[image.known], image.rows[image.known])
     jump = torch.diff(settled - image.rows, n=2, dim=-1)[:, :66, 48:81].abs().max()
-    assert jump < 0.01, "metres a frame squared, of an error of 30 cm"
+    assert jump < 0.015, "metres a frame squared, of an error of 30 cm"
 
 
 def test_a_joint_that_is_never_observed_keeps_the_network_s_word(walk):
