@@ -79,7 +79,7 @@ def run_long(
     """
     length = len(positions)
     complete = observed.all(axis=1)
-    first = starts(complete & ~complete.all())
+    first = starts(np.logical_and(complete, not complete.all()))
     inside = first[:, None] + np.arange(LENGTH)
     frames = np.minimum(inside, length - 1)
     outputs = run(path, positions[frames], observed[frames])
