@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from interpose.methods import weights
-from interpose.methods.cae import run
+from interpose.methods.cae import run, run_long
 
 PAPER = 0.3  # ms a frame
 FRAMES = 1927
@@ -40,11 +40,14 @@ def motion(frames: int) -> tuple[np.ndarray, np.ndarray]:
 
 def main() -> None:
     path = weights.find("cae").onnx
-    ours = timed(lambda: run(path, *motion(FRAMES)))
-    print(f"ONNX Runtime, 1 thread: {FRAMES} frames in {ours:.3f} s, {1000 * ours / FRAMES:.3f} ms a frame")
-    print(f"ratio to the paper's {PAPER} ms on a GPU: {1000 * ours / FRAMES / PAPER:.2f}")
-    for frames in (100, 1_000, 10_000):
-        spent = timed(partial(run, path, *motion(frames)), 3)
+    positions, observed = motion(FRAMES)
+    used = timed(partial(run_long, path, positions[0], observed[0]))
+    print(f"as it is used, in windows: {FRAMES} frames in {used:.3f} s, {1000 * used / FRAMES:.3f} ms a frame")
+    print(f"ratio to the paper's {PAPER} ms on a GPU: {1000 * used / FRAMES / PAPER:.2f}")
+    ours = timed(partial(run, path, positions, observed))
+    print(f"the graph over the whole: {1000 * ours / FRAMES:.3f} ms a frame")
+    for frames in (120, 1_200, 12_000):
+        spent = timed(partial(run_long, path, *(a[0] for a in motion(frames))), 3)
         print(f"{frames:>7} frames: {1000 * spent / frames:.3f} ms a frame")
     try:
         import torch
@@ -54,7 +57,7 @@ def main() -> None:
     from interpose.models.cae import Infiller
 
     torch.set_num_threads(1)
-    model, (positions, observed) = Infiller().eval(), motion(FRAMES + 25)
+    model = Infiller().eval()
     given = torch.from_numpy(positions).float(), torch.from_numpy(observed)
     with torch.no_grad():
         eager = timed(lambda: model(*given))
