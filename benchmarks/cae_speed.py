@@ -42,7 +42,9 @@ def main() -> None:
     path = weights.find("cae").onnx
     positions, observed = motion(FRAMES)
     used = timed(partial(run_long, path, positions[0], observed[0]))
-    print(f"as it is used, in windows: {FRAMES} frames in {used:.3f} s, {1000 * used / FRAMES:.3f} ms a frame")
+    print(
+        f"as it is used, in windows: {FRAMES} frames in {used:.3f} s, {1000 * used / FRAMES:.3f} ms a frame"
+    )
     print(f"ratio to the paper's {PAPER} ms on a GPU: {1000 * used / FRAMES / PAPER:.2f}")
     ours = timed(partial(run, path, positions, observed))
     print(f"the graph over the whole: {1000 * ours / FRAMES:.3f} ms a frame")
