@@ -1,1 +1,1 @@
-"""How completions are judged: metrics, published protocols, tables."""
+"""How completions are judged: published protocols, windows of held-out performers, tables."""
