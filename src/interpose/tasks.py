@@ -223,7 +223,8 @@ def _joined(reports: list[GapReport]) -> list[GapReport]:
         # Of all frames so far, those that the new piece added.
         share = (one.stop - last.stop) / (one.stop - last.start)
         worst = {
-            name: _over(last, one, name, max) for name in ("seam_before", "seam_after", "bone_deviation")
+            name: _over(last, one, name, max)
+            for name in ("seam_before", "seam_after", "peak", "peak_limit", "bone_deviation")
         }
         means = {
             name: _over(last, one, name, lambda a, b, share=share: a + share * (b - a))

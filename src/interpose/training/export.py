@@ -73,7 +73,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     out.mkdir(parents=True, exist_ok=True)
     export_onnx(model, out / "cae.onnx")
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
-    log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    log, earlier = _history(folder)
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
     hours = [entry["hours"] for entry in log]
     line_plot(
@@ -117,7 +117,8 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
             **settings,
             "splits": splits,
             "steps": log[-1]["step"],
-            "device_hours": log[-1]["hours"],
+            "device_hours": log[-1]["hours"],  # from the first start on, as the steps
+            "earlier": earlier,
             "parameters": sum(p.numel() for p in model.parameters()),
             "date": datetime.date.today().isoformat(),
             "statistics": {
@@ -131,3 +132,20 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     )
     card.save(out / "cae.json")
     return card
+
+
+def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    """The log of a run, after that of the weights that it started from; and what their card said of them."""
+
+    def lines(name: str) -> list[dict[str, Any]]:
+        return [json.loads(line) for line in (folder / name).read_text().splitlines()]
+
+    if not (folder / "earlier.json").exists():
+        return lines("log.jsonl"), []
+    before = lines("earlier.jsonl")
+    steps, hours = before[-1]["step"], before[-1]["hours"]
+    after = [
+        {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
+        for entry in lines("log.jsonl")
+    ]
+    return before + after, json.loads((folder / "earlier.json").read_text())

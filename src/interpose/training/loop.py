@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -19,6 +20,7 @@ from torch import Tensor, nn
 from torch import distributed as dist
 
 from interpose.errors import FileError
+from interpose.methods.weights import Card
 from interpose.training.budget import Budget
 
 
@@ -61,6 +63,27 @@ def commit() -> str:
         return answer.stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
+
+
+def restore(model: nn.Module, path: Path) -> None:
+    """Fill a model with the weights that an exported graph holds (16 bits of them, where they are large)."""
+    import onnx
+    from onnx import numpy_helper
+
+    held = {one.name.removesuffix(".half"): one for one in onnx.load(path).graph.initializer}
+    with torch.no_grad():
+        for name, value in model.state_dict().items():
+            if name not in held or list(held[name].dims) != list(value.shape):
+                raise FileError(
+                    f"cannot start from {path.name}",
+                    f"it has no {name} of the shape {list(value.shape)}",
+                    "Name weights of the same network.",
+                )
+            value.copy_(torch.from_numpy(numpy_helper.to_array(held[name]).astype(np.float32)))
+
+
+def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
+    return {name: value for name, value in values.items() if name not in names}
 
 
 class Trainer:
@@ -108,6 +131,14 @@ class Trainer:
         self.rng = np.random.default_rng([self.settings.seed, rank(), state["steps"]])
         self.budget.spent_seconds, self.budget.spent_steps = state["seconds"], state["steps"]
         return True
+
+    def follow(self, start: Card) -> None:
+        """Keep the history of the weights that the run starts from, for the card of what comes out."""
+        if rank() == 0:
+            history = [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
+            (self.folder / "earlier.json").write_text(json.dumps(history, indent=2) + "\n")
+            log = start.path.with_name("log.jsonl")
+            (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
 
     def save(self) -> None:
         state = {
