@@ -8,14 +8,19 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
+onnx = pytest.importorskip("onnx")
+
+from onnx import numpy_helper  # noqa: E402
 
 from interpose.datasets import Pack  # noqa: E402
 from interpose.datasets.pack import STEP  # noqa: E402
 from interpose.errors import FileError, RequestError  # noqa: E402
+from interpose.methods import weights  # noqa: E402
 from interpose.models.cae import Infiller  # noqa: E402
 from interpose.skeletons import find_mapping  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cae import CaeSettings, corrupt, curriculum_mean, train_cae  # noqa: E402
+from interpose.training.export import export_cae  # noqa: E402
 from interpose.training.windows import Windows  # noqa: E402
 
 
@@ -106,3 +111,20 @@ def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):
     (tmp_path / "checkpoint.pt").write_bytes(b"PK not really")
     with pytest.raises(FileError, match="cannot go on"):
         train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2))
+
+
+def test_a_run_from_shipped_weights_begins_with_them_and_keeps_their_history(pack, tmp_path):
+    card = weights.find("cae")
+    settings = CaeSettings(length=64, batch=1, learning_rate=1e-9, every_seconds=0.0)
+    model = train_cae([pack], tmp_path, Budget.parse("2steps"), settings, start=card)
+    held = {one.name.removesuffix(".half"): one for one in onnx.load(card.onnx).graph.initializer}
+    for name, value in model.state_dict().items():
+        shipped = numpy_helper.to_array(held[name]).astype(np.float32)
+        assert np.allclose(value, shipped, atol=1e-6), name
+    history = json.loads((tmp_path / "earlier.json").read_text())
+    assert history[-1]["budget"] == card.training["budget"]
+    new = export_cae(tmp_path, [pack], tmp_path / "out", ["train"])
+    assert new.training["steps"] == card.training["steps"] + 2
+    assert new.training["earlier"] == history
+    log = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
+    assert [entry["step"] for entry in log] == sorted(entry["step"] for entry in log)
