@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 from interpose import tasks
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.finish import complete
+from interpose.geometry import rotations
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights
 from interpose.observation import Gap, Observation, Pin
@@ -153,12 +154,24 @@ def test_too_long_for_the_network_is_filled_by_the_spline_and_said(cmu_walk):
     assert "100 frames" in " ".join(done.report.gaps[0].notes)
 
 
-def test_unknown_humanoid_is_refused_with_the_reason(cmu_walk):
-    names = tuple(f"bone{j}" for j in range(len(cmu_walk.skeleton)))
-    strange = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, names=names), source=None)
-    report = tasks.fill(strange, [Gap(60, 90)], "cae").report.gaps[0]
+def test_what_is_no_humanoid_is_filled_by_the_spline_with_the_reason():
+    """A dog: four legs, a level back, a tail."""
+    bones = {"pelvis": (-1, (0, 0.5, 0)), "chest": (0, (0, 0, 0.5)), "skull": (1, (0, 0.2, 0.2))}
+    bones["tail"] = (0, (0, 0.1, -0.2))
+    for name, above, side in (("a", 0, 0.1), ("b", 0, -0.1), ("c", 1, 0.1), ("d", 1, -0.1)):
+        count = len(bones)
+        bones[name + "1"] = (above, (side, 0, 0))
+        bones |= {f"{name}{k + 2}": (count + k, (0, -0.2, 0.02)) for k in range(3)}
+    skeleton = Skeleton(
+        tuple(bones), tuple(p for p, _ in bones.values()), np.array([b for _, b in bones.values()])
+    )
+    time = np.arange(90)[:, None, None] / 30
+    swing = rotations.exp(0.4 * np.sin(7 * time + np.arange(len(bones))[:, None]) * [1.0, 0, 0])
+    dog = Clip(skeleton, swing, np.array([0, 0.5, 0]) + time * [0, 0, 1.0], 30.0)
+    report = tasks.fill(dog, [Gap(30, 60)], "cae").report.gaps[0]
     assert report.method == "spline"
-    assert "no joints for Hips" in " ".join(report.notes)
+    assert "humanoids only" in " ".join(report.notes)
+    assert report.foot_slide is None
 
 
 @pytest.mark.parametrize("fps", [24, 25, 60, 120])

@@ -5,6 +5,7 @@ Units and axes: metres, Y up, right-handed; unit quaternions (w, x, y, z); frame
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -25,6 +26,8 @@ class Skeleton:
         rest_translation: (J, 3) metres, from the parent, in the parent's axes: the bone vectors.
         rest_rotation: (J, 4) local rotation of the rest pose; identity where a format has none.
         rest_scale: (J,) uniform scale of a joint, applied to everything below it.
+        roles: what somebody said about the joints: canonical joint to own joint ("" for none), and "root" to
+            the top joint of the character that is meant. Empty where nobody needs to say anything.
     """
 
     names: tuple[str, ...]
@@ -32,6 +35,7 @@ class Skeleton:
     rest_translation: np.ndarray
     rest_rotation: np.ndarray = None  # type: ignore[assignment]
     rest_scale: np.ndarray = None  # type: ignore[assignment]
+    roles: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         count = len(self.names)

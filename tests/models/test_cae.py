@@ -12,7 +12,7 @@ torch = pytest.importorskip("torch")
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods.cae import LENGTH, run, run_long, starts  # noqa: E402
 from interpose.models.cae import Autoencoder, Infiller, integrate, neighbours, settle, to_image  # noqa: E402
-from interpose.skeletons import JOINTS, SIDES, find_mapping  # noqa: E402
+from interpose.skeletons import JOINTS, SIDES, find_humanoid  # noqa: E402
 from interpose.training.deconvolution import quicken  # noqa: E402
 from interpose.training.export import export_onnx  # noqa: E402
 
@@ -20,9 +20,8 @@ from interpose.training.export import export_onnx  # noqa: E402
 @pytest.fixture(scope="module")
 def walk(cmu_walk):  # type: ignore[no-untyped-def]
     """(1, T, 22, 3) canonical positions of a real walk at 30 fps."""
-    mapping = find_mapping(cmu_walk.skeleton)
-    step = round(cmu_walk.fps / 30)
-    positions = mapping.positions(cmu_walk.positions()[::step]) * mapping.scale
+    body = find_humanoid(cmu_walk)
+    positions = body.positions(cmu_walk) * body.scale
     return torch.tensor(positions[None, :128], dtype=torch.float64)
 
 

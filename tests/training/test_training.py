@@ -15,9 +15,10 @@ from onnx import numpy_helper  # noqa: E402
 from interpose.datasets import Pack  # noqa: E402
 from interpose.datasets.pack import STEP  # noqa: E402
 from interpose.errors import FileError, RequestError  # noqa: E402
+from interpose.geometry import rotations  # noqa: E402
 from interpose.methods import weights  # noqa: E402
 from interpose.models.cae import Infiller  # noqa: E402
-from interpose.skeletons import find_mapping  # noqa: E402
+from interpose.skeletons import find_humanoid  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cae import CaeSettings, corrupt, curriculum_mean, train_cae  # noqa: E402
 from interpose.training.export import export_cae  # noqa: E402
@@ -26,16 +27,14 @@ from interpose.training.windows import Windows  # noqa: E402
 
 @pytest.fixture(scope="module")
 def pack(cmu_walk):  # type: ignore[no-untyped-def]
-    mapping = find_mapping(cmu_walk.skeleton)
-    step = round(cmu_walk.fps / 30)
-    positions = mapping.positions(cmu_walk.positions()[::step]) * mapping.scale
-    offset = np.rint((positions - positions[:, :1]) / STEP).astype(np.int16)
-    half = len(positions) // 2
+    body = find_humanoid(cmu_walk)
+    half = len(cmu_walk) // 2
     return Pack(
         "cmu",
-        offset,
-        positions[:, 0].astype(np.float32),
-        np.array([0, half, len(positions)]),
+        np.rint(rotations.log(body.rotations(cmu_walk)) / STEP).astype(np.int16),
+        (body.root(cmu_walk) * body.scale).astype(np.float32),
+        np.tile(body.bones * body.scale, (2, 1, 1)).astype(np.float32),
+        np.array([0, half, len(cmu_walk)]),
         np.array(["a", "b"]),
         np.array(["02", "08"]),
         np.array(["walk", "walk"]),
@@ -80,8 +79,7 @@ def test_windows_are_real_motion_padded_with_the_last_pose(pack):
     windows = Windows([pack], ["train"], 500, torch.device("cpu"))
     positions = windows.draw(np.random.default_rng(0), 3, mirror=False)
     half = int(pack.starts[1])
-    truth = pack.hips[:half, None] + pack.offset[:half].astype(np.float32) * STEP
-    assert np.allclose(positions[0, :half], truth, atol=1e-6)
+    assert np.allclose(positions[0, :half], pack.positions()[:half], atol=1e-4)
     assert torch.equal(positions[0, half:], positions[0, half - 1 : half].expand(500 - half, -1, -1))
 
 

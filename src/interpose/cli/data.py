@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 from cyclopts import App
 
 from interpose.cli.console import say, say_json, say_table
 from interpose.errors import RequestError
 
+SPLITS = ("train", "validation", "test")
+LABELS = 12  # as many are printed, the frequent ones first
+
 data = App(name="data", help="The public data sets: what is there, and packing it for training.")
 
 
 @data.command
 def info(*, data: Path = Path("data"), json: bool = False) -> None:
-    """Count the clips of each data set, and how they are split by performer.
+    """Count the clips, hours, performers and labels of each data set, and say how they are split.
 
     Args:
         data: the folder with the unpacked data sets; docs/data.md says where to get them.
@@ -24,26 +28,47 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
     from interpose.datasets import DATASETS, clips
     from interpose.errors import FileError
 
-    found = {}
+    found: dict[str, dict[str, Any]] = {}
     for name in DATASETS:
         try:
             entries = clips(name, data)
         except FileError:
             entries = []
+        hours = dict.fromkeys(SPLITS, 0.0)
+        for entry in entries:
+            hours[entry.split] += entry.seconds() / 3600
         found[name] = {
             "clips": len(entries),
-            "performers": len({entry.performer for entry in entries}),
+            "hours": round(sum(hours.values()), 3),
+            "performers": sorted({entry.performer for entry in entries}),
+            "labels": Counter(entry.label for entry in entries if entry.label),
             **{
-                split: Counter(entry.split for entry in entries)[split]
-                for split in ("train", "validation", "test")
+                split: {
+                    "clips": sum(entry.split == split for entry in entries),
+                    "hours": round(hours[split], 3),
+                    "performers": sorted({entry.performer for entry in entries if entry.split == split}),
+                }
+                for split in SPLITS
             },
         }
     if json:
         say_json({"data": str(data), "sets": found})
         return
-    columns = ("clips", "performers", "train", "validation", "test")
-    rows = [[name, *(str(counts[column]) for column in columns)] for name, counts in found.items()]
+    columns = ("clips", "hours", "performers", *SPLITS)
+    rows = []
+    for name, one in found.items():
+        parts = [f"{one[split]['clips']} ({one[split]['hours']:.2f} h)" for split in SPLITS]
+        rows.append([name, str(one["clips"]), f"{one['hours']:.2f}", str(len(one["performers"])), *parts])
     say_table(("data set", *columns), rows, right=columns)
+    for name, one in found.items():
+        say()
+        for split in ("validation", "test"):
+            if one[split]["performers"]:
+                say(f"{name}, {split}: {', '.join(one[split]['performers'])}")
+        if one["labels"]:
+            most = [f"{label} {count}" for label, count in one["labels"].most_common(LABELS)]
+            more = len(one["labels"]) - len(most)
+            say(f"{name}, labels: {', '.join(most)}" + (f" and {more} more" if more > 0 else ""))
 
 
 @data.command
@@ -82,4 +107,5 @@ def pack(*names: str, data: Path = Path("data"), out: Path = Path("packs"), forc
         finally:
             part.unlink(missing_ok=True)
         size = (out / f"{name}.npz").stat().st_size / 1e6
-        say(f"wrote {out / name}.npz: {len(packed.names)} clips, {len(packed.hips):,} frames, {size:.1f} MB")
+        hours = packed.seconds.sum() / 3600
+        say(f"wrote {out / name}.npz: {len(packed.names)} clips, {hours:.2f} h, {size:.1f} MB")

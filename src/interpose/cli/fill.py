@@ -67,9 +67,9 @@ def fill(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method, from_options, reading_of
+    from interpose.cli.request import check_method, from_options, reading_of, roles_of
 
-    clip = reading_of(gaps, reading).load(file)
+    clip = reading_of(gaps, reading).load(file, roles_of(gaps))
     request = from_options(file, clip, gap, joints, gaps)
     if method is not None:
         check_method(method)

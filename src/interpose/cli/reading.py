@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Group, Parameter
@@ -34,14 +36,28 @@ class Reading:
     file_fps: Annotated[
         float | None, Parameter(help="Frames a second of an .amc file, which does not say it; else 120.")
     ] = None
+    map: Annotated[
+        Path | None,
+        Parameter(help="A JSON file that says which joint is which; `interpose skeleton` writes one."),
+    ] = None
+    root: Annotated[
+        str | None, Parameter(help="The topmost joint of the character meant, where a file has several.")
+    ] = None
 
-    def load(self, path: Path) -> Clip:
-        """The clip in a file."""
+    def load(self, path: Path, roles: Mapping[str, str] = MappingProxyType({})) -> Clip:
+        """The clip in a file; `roles` of its joints stand where no --map is given."""
         from interpose.formats import load
+        from interpose.skeletons import find_mapping
+        from interpose.skeletons.mapfile import read_map
 
         if path.is_dir():  # whatever its name ends in
             raise FileError(f"cannot read {path}", "it is a directory", "Name one file in it.")
-        return load(path, self.unit, self.up, self.joint_positions, self.skeleton, self.file_fps)
+        said = read_map(self.map) if self.map else dict(roles)
+        if self.root is not None:
+            said["root"] = self.root
+        clip = load(path, self.unit, self.up, self.joint_positions, self.skeleton, self.file_fps, said)
+        find_mapping(clip.skeleton)  # says what is wrong with the roles, before anything else is done
+        return clip
 
 
 def split_names(texts: list[str]) -> tuple[str, ...]:
@@ -59,6 +75,8 @@ def describe(path: Path, clip: Clip) -> list[str]:
 def details(clip: Clip) -> dict[str, Any]:
     """The same for a program: how to read the file in the same way again."""
     found: dict[str, Any] = {"frames": len(clip), "fps": clip.fps, "joints": len(clip.skeleton)}
+    if clip.skeleton.roles:
+        found["roles"] = dict(clip.skeleton.roles)
     source = clip.source
     if hasattr(source, "unit"):
         found |= {"unit": source.unit, "unit_how": source.unit_how, "up": source.up, "up_how": source.up_how}

@@ -139,6 +139,13 @@ def reading_of(path: Path | None, reading: Reading) -> Reading:
     return replace(reading, **said)
 
 
+def roles_of(path: Path | None) -> dict[str, str]:
+    """What a report says that was said about the joints."""
+    content = read_json(path) if path else None
+    roles = content.get("roles") if content is not None and is_report(content) else None
+    return {str(name): str(own) for name, own in roles.items()} if isinstance(roles, dict) else {}
+
+
 def check_method(name: str) -> None:
     """Raises RequestError listing all methods, auto among them, for a name that is none."""
     from interpose.methods import registry

@@ -12,12 +12,15 @@ from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 from interpose.clip import Clip
 from interpose.errors import FileError, unknown
 from interpose.formats import load
 
 FPS = 30.0
+_BVH_LENGTH = re.compile(rb"Frames:\s*(\d+)\s+Frame Time:\s*([\d.eE+-]+)")
+_AMC_FRAME = re.compile(rb"^\d+\s*$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -37,12 +40,25 @@ class Entry:
     def load(self) -> Clip:
         """The clip, without the rest pose that CMU's BVH files begin with."""
         clip = load(self.path)
-        return clip.slice(1, len(clip)) if self.dataset == "cmu" else clip
+        rest_pose = self.dataset == "cmu" and self.path.suffix == ".bvh"
+        return clip.slice(1, len(clip)) if rest_pose else clip
+
+    def seconds(self) -> float:
+        """How long the clip is, without reading its motion."""
+        if self.path.suffix == ".amc":
+            return len(_AMC_FRAME.findall(self.path.read_bytes())) / 120.0
+        head = _BVH_LENGTH.search(self.path.read_bytes())
+        return int(head[1]) * float(head[2]) if head else 0.0
 
 
 @cache
-def _splits() -> dict[str, dict[str, list[str]]]:
+def _splits() -> dict[str, dict[str, Any]]:
     return json.loads((files("interpose.datasets") / "splits.json").read_text())
+
+
+def trains_shipped_weights(dataset: str) -> bool:
+    """Whether weights that are given away may be trained on a data set."""
+    return not _splits()[dataset].get("never_trains_shipped_weights", False)
 
 
 def split_of(dataset: str, performer: str) -> str:
@@ -78,7 +94,19 @@ def _pfnn(folder: Path) -> list[Entry]:
 
 
 def _cmu(folder: Path) -> list[Entry]:
-    return [Entry("cmu", path, path.parent.name, "") for path in sorted(folder.glob("bvh/*/*.bvh"))]
+    """A trial that is published in both forms counts once, as BVH."""
+    paths = sorted(folder.glob("bvh/*/*.bvh"))
+    known = {path.stem for path in paths}
+    paths += [path for path in sorted(folder.glob("asf_amc/*/*.amc")) if path.stem not in known]
+    return [Entry("cmu", path, path.parent.name, "") for path in paths]
+
+
+def _hdm05(folder: Path) -> list[Entry]:
+    found = []
+    for path in sorted(folder.glob("**/HDM_*.amc")):
+        _, performer, action, *_ = path.stem.split("_")
+        found.append(Entry("hdm05", path, performer, action))
+    return found
 
 
 DATASETS: dict[str, Callable[[Path], list[Entry]]] = {
@@ -86,6 +114,7 @@ DATASETS: dict[str, Callable[[Path], list[Entry]]] = {
     "bandai": _bandai,
     "pfnn": _pfnn,
     "cmu": _cmu,
+    "hdm05": _hdm05,
 }
 
 

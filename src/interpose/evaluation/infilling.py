@@ -238,9 +238,10 @@ def _measure(result: Infilling, window: Window, frames: int) -> None:
 
 def _spoken(window: Window, positions: np.ndarray) -> np.ndarray:
     """What a network says of a skeleton's own joints, as canonical positions (T, 22, 3)."""
+    mapping = window.body.mapping
     own = np.zeros((len(positions), len(window.clip.skeleton), 3))
-    own[:, [joint for joint in window.mapping.joints if joint is not None]] = positions
-    return window.mapping.positions(own)
+    own[:, mapping.mapped[1]] = positions
+    return np.einsum("cj,fjx->fcx", mapping.weights, own)
 
 
 def _linear(positions: np.ndarray, gap: Gap) -> np.ndarray:

@@ -13,7 +13,7 @@ from interpose.datasets import clips
 from interpose.errors import RequestError
 from interpose.geometry.ground import turn
 from interpose.observation import Gap, Observation
-from interpose.skeletons import Mapping, find_mapping
+from interpose.skeletons import Humanoid, find_humanoid
 from interpose.skeletons.body import facing
 
 SPLITS = ("validation", "test")
@@ -25,7 +25,7 @@ class Window:
 
     dataset: str
     clip: Clip
-    mapping: Mapping
+    body: Humanoid
     positions: np.ndarray
 
     def centred(self, gap: int) -> Gap:
@@ -37,7 +37,7 @@ class Window:
         return Observation.from_gaps(self.clip, [gap] if len(gap) else [])
 
     def canonical(self, clip: Clip) -> np.ndarray:
-        return self.mapping.positions(clip.positions())
+        return self.body.positions(clip)
 
     def on_true_way(self, positions: np.ndarray) -> np.ndarray:
         """Poses (T, 22, 3) laid on the true trajectory: hips over the true point, facing the true way.
@@ -97,5 +97,5 @@ def windows(
             starts = [starts[i] for i in np.linspace(0, len(starts) - 1, most).astype(int)]
         for clip, start in starts:
             cut = clip.slice(start, start + length)
-            mapping = find_mapping(cut.skeleton)
-            yield Window(dataset, cut, mapping, mapping.positions(cut.positions()))
+            body = find_humanoid(cut)
+            yield Window(dataset, cut, body, body.positions(cut))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,9 +27,9 @@ class Format(NamedTuple):
 
 
 FORMATS = {
-    ".bvh": Format(bvh.read, bvh.write, ("unit", "up", "joint_positions")),
-    ".npz": Format(npz.read, npz.write),
-    ".amc": Format(asf_amc.read, asf_amc.write, ("unit", "up", "skeleton", "fps")),
+    ".bvh": Format(bvh.read, bvh.write, ("unit", "up", "joint_positions", "roles")),
+    ".npz": Format(npz.read, npz.write, ("roles",)),
+    ".amc": Format(asf_amc.read, asf_amc.write, ("unit", "up", "skeleton", "fps", "roles")),
 }
 
 
@@ -40,6 +40,7 @@ def load(
     joint_positions: str | None = None,
     skeleton: str | Path | None = None,
     fps: float | None = None,
+    roles: Mapping[str, str] | None = None,
 ) -> Clip:
     """Read a clip from a file; the suffix says how (.bvh, .npz, .amc). Metres and Y up inside.
 
@@ -51,6 +52,7 @@ def load(
             Estimated when None.
         skeleton: the .asf file that an .amc file belongs to. Found beside it when None.
         fps: frames a second of an .amc file, which does not say it. 120 when None.
+        roles: what is to be said about the joints: canonical joint to own joint, and "root"; see `Skeleton`.
 
     What was estimated stands in `clip.source` (a `bvh.BvhSource` or `asf_amc.AmcSource`; its `describe()`
     gives lines to print).
@@ -62,7 +64,7 @@ def load(
     path = Path(path)
     chosen = _format(path)
     options: dict[str, Any] = {"unit": unit, "up": up, "joint_positions": joint_positions}
-    options |= {"skeleton": skeleton, "fps": fps}
+    options |= {"skeleton": skeleton, "fps": fps, "roles": roles or None}
     options = {name: value for name, value in options.items() if value is not None}
     for name in options:
         if name not in chosen.options:

@@ -8,6 +8,7 @@ Metres, Y up, quaternions (w, x, y, z).
 from __future__ import annotations
 
 import zipfile
+from collections.abc import Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -24,8 +25,8 @@ ARRAYS = (
 )
 
 
-def read(path: Path) -> Clip:
-    """The clip in an .npz file. Raises FileError when the file is damaged or is no clip."""
+def read(path: Path, roles: Mapping[str, str] | None = None) -> Clip:
+    """The clip in an .npz file; `roles` as in Skeleton. Raises FileError when it is damaged or no clip."""
     what = f"cannot read {path.name} as a clip"
     again = "Write it again with interpose.save."
     try:
@@ -47,6 +48,7 @@ def read(path: Path) -> Clip:
                 np.asarray(file["rest_translation"], float).reshape(count, 3),
                 np.asarray(file["rest_rotation"], float).reshape(count, 4),
                 np.asarray(file["rest_scale"], float).reshape(count),
+                roles or {},
             )
             translated = tuple(int(joint) for joint in file["translated"])
             if not set(skeleton.roots) <= set(translated) <= set(range(count)):

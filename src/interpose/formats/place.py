@@ -10,9 +10,9 @@ from interpose.geometry import kinematics
 from interpose.skeletons import JOINTS, Mapping
 
 INCH = 0.0254
-# Metres. The last is the scale of the CMU data: 1/0.45 inch.
-UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": INCH, "CMU": INCH / 0.45}
-LEG = 0.45, 1.25  # metres: thigh and shin of a child and of a giant
+# Metres, the likelier first. CMU is the scale of that data: 1/0.45 inch.
+UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "CMU": INCH / 0.45, "inch": INCH}
+LEG = 0.40, 1.25  # metres: thigh and shin of a child and of a giant
 USUAL_LEG = 0.85
 BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
 SAMPLE = 51  # frames looked at for estimates

@@ -15,7 +15,7 @@ from interpose.methods import weights
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import Mapping, find_mapping
+from interpose.skeletons import Humanoid, Mapping, find_humanoid, find_mapping
 
 # Frames that the network was trained on. It learns where in its window it is, so it gets no other length:
 # with 128 frames it does a quarter worse.
@@ -116,8 +116,8 @@ class Cae:
         """Why not: a skeleton that is no humanoid, or a gap beyond what the network was trained for."""
         mapping = find_mapping(clip.skeleton)
         if not mapping.usable:
-            missing = ", ".join(mapping.missing)
-            return f"the skeleton has no joints for {missing} (known by their names)"
+            lacking = ", ".join(mapping.lacking)
+            return f"it fills humanoids only, and no joints were found for {lacking} (--map names them)"
         if gap.joints is not None and not self._moves(mapping, gap.joints):
             return (
                 "no joint that the network knows hangs below these, so positions do not tell their rotation"
@@ -140,25 +140,24 @@ class Cae:
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Positions of the mapped joints at every frame, beside a spline for what positions cannot tell."""
-        card, mapping = self.card, find_mapping(clip.skeleton)
+        card, body = self.card, find_humanoid(clip)
         base = Spline().complete(clip, observation).clip
-        known = mapping.observed(observation.positions(clip.skeleton))
-        positions = mapping.positions(clip.positions()) * mapping.scale
+        known = body.observed(observation.positions(clip.skeleton), observation.rotation)
+        positions = body.positions(clip) * body.scale
         times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         seen = known[before] & known[after]
-        body, raw, completed = run_long(card.onnx, sample(positions, times), seen)
+        poses, raw, completed = run_long(card.onnx, sample(positions, times), seen)
         calm = ndimage.gaussian_filter1d(completed, SMOOTH, axis=0, mode="nearest")
         completed = np.where(seen[..., None], completed, calm)
-        drift = self._drift(observation, raw, completed, times, mapping)
+        drift = self._drift(observation, raw, completed, times, body)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
-        spoken, own = (sample_smooth(out, back) / mapping.scale for out in (completed, body))
-        canonical = [i for i, joint in enumerate(mapping.joints) if joint is not None]
-        joints = tuple(int(mapping.joints[i]) for i in canonical)  # type: ignore[arg-type]
+        spoken, own = (sample_smooth(out, back) / body.scale for out in (completed, poses))
+        rows, joints = body.mapping.mapped
         notes = {"model": card.name, "drift": drift}
-        return Raw(base, spoken[:, canonical], joints, notes, own[:, canonical])
+        return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
 
     def _drift(
         self,
@@ -166,12 +165,12 @@ class Cae:
         raw: np.ndarray,
         completed: np.ndarray,
         times: np.ndarray,
-        mapping: Mapping,
+        body: Humanoid,
     ) -> dict[str, float]:
         """Metres by which the root had drifted at the end of each gap, before it was corrected."""
-        off = np.linalg.norm((raw - completed)[:, 0], axis=-1) / mapping.scale
+        off = np.linalg.norm((raw - completed)[:, 0], axis=-1) / body.scale
         drift = {}
-        for gap in observation.gaps(mapping.skeleton):
+        for gap in observation.gaps(body.mapping.skeleton):
             inside = (times >= gap.start) & (times < gap.stop)
             if gap.joints is None and inside.any():
                 drift[f"{gap.start}:{gap.stop}"] = float(off[inside].max())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 JOINTS = (
     "Hips",
     *("LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToe"),
@@ -20,3 +22,34 @@ SIDES = tuple(
 
 # Thigh plus shin in metres, of LAFAN1's actors: networks see every clip scaled to this leg.
 LEG_LENGTH = 0.8587
+
+# Bones of the canonical T-pose in metres: where a joint lies from its parent. The body faces along Z, its
+# left is along X, palms look down; lengths are those of LAFAN1's actors.
+_LEFT = {
+    "UpLeg": (0.105, 0.0, 0.019),
+    "Leg": (0.0, -0.435, 0.0),
+    "Foot": (0.0, -0.4237, 0.0),
+    "Toe": (0.0, -0.083, 0.152),
+    "Shoulder": (0.06, 0.197, -0.015),
+    "Arm": (0.113, 0.0, 0.0),
+    "ForeArm": (0.33, 0.0, 0.0),
+    "Hand": (0.252, 0.0, 0.0),
+}
+_MIDDLE = {
+    "Hips": (0.0, 0.0, 0.0),
+    "Spine": (0.0, 0.069, -0.026),
+    "Spine1": (0.0, 0.126, 0.0),
+    "Spine2": (0.0, 0.123, 0.0),
+    "Neck": (0.0, 0.258, 0.0),
+    "Head": (0.0, 0.118, 0.0),
+}
+
+
+def _bone(name: str) -> tuple[float, float, float]:
+    if name in _MIDDLE:
+        return _MIDDLE[name]
+    x, y, z = _LEFT[name.removeprefix("Left").removeprefix("Right")]
+    return (x if name.startswith("Left") else -x), y, z
+
+
+BONES = np.array([_bone(name) for name in JOINTS])

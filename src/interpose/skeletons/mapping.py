@@ -1,62 +1,51 @@
-"""Which of a skeleton's joints are the 22 canonical ones, found by a table of names."""
+"""Which of a skeleton's joints are the 22 canonical ones: by what was said, by names, by topology."""
 
 from __future__ import annotations
 
-import re
+from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from interpose.clip import Skeleton
-from interpose.skeletons.canonical import JOINTS, LEG_LENGTH
+from interpose.errors import RequestError, unknown
+from interpose.skeletons import names
+from interpose.skeletons.canonical import BONES, JOINTS, LEG_LENGTH
+from interpose.skeletons.topology import guess
 
-# Left-hand names; the right-hand ones follow. Spelling is compared in lower case, without prefix and
-# punctuation. The first name of a line that a skeleton has is taken.
-NAMES: dict[str, tuple[str, ...]] = {
-    "Hips": ("hips", "hip", "pelvis", "root"),
-    "LeftUpLeg": ("leftupleg", "leftupperleg", "leftthigh", "upperlegl", "thighl", "lfemur", "lefthip"),
-    "LeftLeg": ("leftleg", "leftlowerleg", "leftshin", "lowerlegl", "calfl", "ltibia", "leftknee"),
-    "LeftFoot": ("leftfoot", "footl", "lfoot", "leftankle"),
-    "LeftToe": ("lefttoe", "lefttoebase", "toesl", "balll", "ltoes", "lefttoes"),
-    "Neck": ("neck1", "neck", "neck01", "lowerneck"),
-    "Head": ("head",),
-    "LeftShoulder": ("leftshoulder", "leftcollar", "shoulderl", "claviclel", "lclavicle"),
-    "LeftArm": ("leftarm", "leftupperarm", "upperarml", "lhumerus"),
-    "LeftForeArm": ("leftforearm", "leftlowerarm", "lowerarml", "leftelbow", "lradius"),
-    "LeftHand": ("lefthand", "handl", "lhand", "leftwrist", "lwrist"),
-}
-
-
-def _right(name: str) -> str:
-    if name.startswith("left"):
-        return "right" + name[4:]
-    return "r" + name[1:] if name.startswith("l") and not name.startswith("lower") else name[:-1] + "r"
+HOW = ("given", "name", "chain", "shape")
+# How sure a joint is: what somebody said, what its own name says, what its place between named joints says,
+# what the shape of the skeleton says where no name helps.
+SURE = {"given": 1.0, "name": 0.95, "chain": 0.9, "shape": 0.6}
+TRUNK = ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
+# Where the joints of the trunk lie along it, in metres of the canonical body.
+ALONG = np.cumsum([np.linalg.norm(BONES[JOINTS.index(name)]) for name in TRUNK])
+# Without these a skeleton is no humanoid; everything else can be derived.
+ESSENTIAL = (
+    "Hips",
+    *(side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Arm", "ForeArm")),
+)
+Levers = dict[int, tuple[int, np.ndarray]]
 
 
-def _table() -> dict[str, tuple[str, ...]]:
-    table = dict(NAMES)
-    for joint, names in NAMES.items():
-        if joint.startswith("Left"):
-            table["Right" + joint[4:]] = tuple(_right(name) for name in names)
-    return table
-
-
-def _plain(name: str) -> str:
-    return re.sub(r"[^a-z0-9]", "", name.rpartition(":")[2].lower())
-
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mapping:
     """Where the canonical joints are in a skeleton.
 
     Attributes:
         skeleton: the skeleton.
         joints: for each of the 22 canonical joints the index in the skeleton, or None.
+        how: for each of them how it was found, one of HOW; "" where it is missing.
     """
 
     skeleton: Skeleton
     joints: tuple[int | None, ...]
+    how: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> int | None:
+        """The skeleton's joint for a canonical one by name."""
+        return self.joints[JOINTS.index(name)]
 
     @property
     def missing(self) -> tuple[str, ...]:
@@ -64,21 +53,77 @@ class Mapping:
         return tuple(name for name, joint in zip(JOINTS, self.joints) if joint is None)
 
     @property
+    def lacking(self) -> tuple[str, ...]:
+        """Those of them without which it is no humanoid: nothing can stand in for them."""
+        head = () if self["Head"] is not None or self["Neck"] is not None else ("Head",)
+        return (*(name for name in self.missing if name in ESSENTIAL), *head)
+
+    @property
     def usable(self) -> bool:
-        """Whether every joint but those that can be derived (one of the spine) is there."""
-        return set(self.missing) <= {"Spine1"}
+        """Whether all that is missing can be derived."""
+        return not self.lacking
+
+    @property
+    def sure(self) -> float:
+        """How sure the mapping is as a whole, 0 to 1: as its least sure essential joint."""
+        if not self.usable:
+            return 0.0
+        return min(SURE[how] for name, how in zip(JOINTS, self.how) if name in ESSENTIAL)
+
+    @cached_property
+    def mapped(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """The canonical joints that the skeleton has, and which of its own they are."""
+        rows = tuple(row for row, joint in enumerate(self.joints) if joint is not None)
+        return rows, tuple(joint for joint in self.joints if joint is not None)
 
     @cached_property
     def weights(self) -> np.ndarray:
-        """(22, J) canonical positions = weights @ positions; a missing Spine1 lies halfway up the spine."""
+        """(22, J): canonical positions are these sums of the skeleton's, but for `levers`.
+
+        A missing joint of the trunk lies on the line between its neighbours there, a missing shoulder on that
+        between the arms.
+        """
         weights = np.zeros((len(JOINTS), len(self.skeleton)))
-        for row, joint in enumerate(self.joints):
-            if joint is not None:
-                weights[row, joint] = 1.0
-        if self.joints[JOINTS.index("Spine1")] is None and self.usable:
-            ends = [JOINTS.index("Spine"), JOINTS.index("Spine2")]
-            weights[JOINTS.index("Spine1")] = 0.5 * weights[ends].sum(axis=0)
+        rows, joints = self.mapped
+        weights[rows, joints] = 1.0
+        if not self.usable:
+            return weights
+        known = [i for i, name in enumerate(TRUNK) if self[name] is not None]
+        for i, name in enumerate(TRUNK):
+            above, below = (
+                next((k for k in some if step * k > step * i), None)
+                for some, step in ((known, 1), (known[::-1], -1))
+            )
+            if i not in known and above is not None and below is not None:
+                share = (ALONG[i] - ALONG[below]) / (ALONG[above] - ALONG[below])
+                ends = [JOINTS.index(TRUNK[below]), JOINTS.index(TRUNK[above])]
+                weights[JOINTS.index(name)] = (1 - share) * weights[ends[0]] + share * weights[ends[1]]
+        out = BONES[JOINTS.index("LeftShoulder"), 0]
+        share = 0.5 + 0.5 * out / (out + BONES[JOINTS.index("LeftArm"), 0])
+        for side, other in (("Left", "Right"), ("Right", "Left")):
+            if self[side + "Shoulder"] is None:
+                arms = [weights[JOINTS.index(name + "Arm")] for name in (side, other)]
+                weights[JOINTS.index(side + "Shoulder")] = share * arms[0] + (1 - share) * arms[1]
         return weights
+
+    @cached_property
+    def levers(self) -> Levers:
+        """Missing ends of limbs: canonical joint to the skeleton's joint that carries it, and the bone to it.
+
+        Metres of the skeleton, in the axes of the T-pose.
+        """
+        ends = {"Head": "Neck"} | {
+            side + end: side + at
+            for side in ("Left", "Right")
+            for end, at in (("Toe", "Foot"), ("Hand", "ForeArm"))
+        }
+        found: Levers = {}
+        for name, at in ends.items():
+            joint = self[at]
+            if self.usable and self[name] is None and joint is not None:
+                row = JOINTS.index(name)
+                found[row] = joint, BONES[row] / self.scale
+        return found
 
     @cached_property
     def leg_length(self) -> float:
@@ -86,7 +131,7 @@ class Mapping:
         lengths = np.linalg.norm(self.skeleton.rest_translation, axis=1) * self.skeleton.scale_above
         total = 0.0
         for side in ("Left", "Right"):
-            top, joint = (self.joints[JOINTS.index(side + part)] for part in ("UpLeg", "Foot"))
+            top, joint = self[side + "UpLeg"], self[side + "Foot"]
             if top is None or joint is None:
                 return float("nan")
             while joint not in (top, -1):
@@ -99,35 +144,200 @@ class Mapping:
         """What positions are multiplied with to give them the canonical leg."""
         return LEG_LENGTH / self.leg_length
 
-    def positions(self, positions: np.ndarray) -> np.ndarray:
-        """(F, J, 3) positions of the skeleton's joints to (F, 22, 3) canonical ones, in metres, unscaled."""
-        return np.einsum("cj,fjx->fcx", self.weights, positions)
 
-    def observed(self, known: np.ndarray) -> np.ndarray:
-        """(F, J) known positions to (F, 22): known when every joint it comes from is known."""
-        return (~known).astype(float) @ (self.weights.T > 0) == 0
-
-
-def _spine(skeleton: Skeleton, found: dict[str, int | None]) -> None:
-    """The spine by topology: from above the hips up to the joint where both arms meet."""
-    hips, left, right = (found[name] for name in ("Hips", "LeftArm", "RightArm"))
-    if hips is None or left is None or right is None:
-        return
-    meet = next((j for j in skeleton.ancestors(left) if j in skeleton.ancestors(right)), hips)
-    chain = [j for j in (meet, *skeleton.ancestors(meet)) if hips in skeleton.ancestors(j)][::-1]
-    if chain:
-        found["Spine"], found["Spine2"] = chain[0], chain[-1]
-        found["Spine1"] = chain[len(chain) // 2] if len(chain) > 2 else None
-
-
+@lru_cache(maxsize=64)
 def find_mapping(skeleton: Skeleton) -> Mapping:
-    """The mapping of a skeleton by its joint names; look at `missing` and `usable` for how far it went."""
-    plain = [_plain(name) for name in skeleton.names]
-    found: dict[str, int | None] = {}
-    table = _table()
-    for joint in JOINTS:
-        taken = set(found.values())
-        hits = [plain.index(name) for name in table.get(joint, ()) if name in plain]
-        found[joint] = next((hit for hit in hits if hit not in taken), None)
-    _spine(skeleton, found)
-    return Mapping(skeleton, tuple(found[joint] for joint in JOINTS))
+    """The mapping of a skeleton; look at `missing`, `usable` and `sure` for how far it went.
+
+    What `skeleton.roles` says stands. Then names are read; a joint that they leave open may follow from those
+    around it (the spine does), and where names say nothing the shape of the skeleton is asked. Where a file
+    has several characters, the one of which most is found is taken, and `roles["root"]` chooses another.
+
+    Raises RequestError when `roles` names joints that are not there, or one joint twice.
+    """
+    given = _given(skeleton)
+    root = skeleton.roles.get("root")
+    roots = [skeleton.index(root)] if root is not None else list(skeleton.roots)
+    found = [_find(skeleton, _below(skeleton, root), given) for root in roots]
+    return max(found, key=lambda mapping: (mapping.usable, len(mapping.mapped[0])))
+
+
+def _given(skeleton: Skeleton) -> dict[str, int | None]:
+    """What somebody said: canonical joint to own joint, None for one that is not there."""
+    given: dict[str, int | None] = {}
+    for name, own in skeleton.roles.items():
+        if name == "root":
+            continue
+        if name not in JOINTS:
+            raise unknown("canonical joint", name, JOINTS)
+        given[name] = skeleton.index(own) if own else None
+    used = [joint for joint in given.values() if joint is not None]
+    if twice := {skeleton.names[joint] for joint in used if used.count(joint) > 1}:
+        raise RequestError(
+            f"the mapping names {', '.join(sorted(twice))} twice",
+            "one joint cannot be two canonical ones",
+            "Name it once; leave out what the skeleton does not have.",
+        )
+    return given
+
+
+def _below(skeleton: Skeleton, root: int) -> list[int]:
+    """A joint and all below it."""
+    inside = {root}
+    for joint, parent in enumerate(skeleton.parents):
+        if parent in inside:
+            inside.add(joint)
+    return sorted(inside)
+
+
+def _find(skeleton: Skeleton, inside: list[int], given: dict[str, int | None]) -> Mapping:
+    """The mapping of the joints `inside`."""
+    said = names.read(skeleton.names)
+    chains = _Chains(skeleton, {joint: said[joint] for joint in inside})
+    found = chains.find()
+    how = dict.fromkeys(found, "name")
+    if not {"LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm"} <= set(found) and (
+        shaped := guess(skeleton, inside)
+    ):
+        found, how = shaped, dict.fromkeys(shaped, "shape")
+    found |= {name: joint for name, joint in given.items() if joint is not None}
+    if any(name in given for name in ESSENTIAL) or "Hips" not in found:
+        found = {**chains.trunk(found), **found}
+    for name in TRUNK:
+        if name in found and how.get(name) != "shape":
+            how[name] = "name" if said[found[name]].part in ("hips", "spine", "neck", "head") else "chain"
+    for name, joint in given.items():
+        how[name] = "given"
+        if joint is None:
+            found.pop(name, None)
+    joints = tuple(found.get(name) for name in JOINTS)
+    return Mapping(
+        skeleton, joints, tuple(how[name] if found.get(name) is not None else "" for name in JOINTS)
+    )
+
+
+class _Chains:
+    """Finds limbs and trunk among joints whose names say something."""
+
+    def __init__(self, skeleton: Skeleton, said: dict[int, names.Said]) -> None:
+        self.skeleton, self.said = skeleton, said
+
+    def find(self) -> dict[str, int]:
+        """Canonical names to joints."""
+        found: dict[str, int] = {}
+        for side, name in ((-1, "Left"), (1, "Right")):
+            found |= {name + part: joint for part, joint in (self._leg(side) | self._arm(side)).items()}
+        return found | self.trunk(found)
+
+    def _first(self, parts: str, side: int, below: int | None = None) -> int | None:
+        """The topmost joint that is one of these parts of a side, below a joint."""
+        for joint, said in self.said.items():
+            under = below is None or below in self.skeleton.ancestors(joint)
+            if said.side == side and said.part in parts.split() and under:
+                return joint
+        return None
+
+    def _leg(self, side: int) -> dict[str, int]:
+        # A "hip" of one side is the thigh where nothing else is called so.
+        thigh, leg = self._first("thigh", side), self._first("leg", side)
+        thigh = self._first("hip", side) if thigh is None else thigh
+        shin = self._first("shin leg", side, thigh) if thigh is not None else self._first("shin", side, leg)
+        thigh = leg if thigh is None and shin is not None else thigh
+        foot = self._first("ankle foot", side, shin) if shin is not None else None
+        toe = self._first("foot toe", side, foot) if foot is not None else None
+        return _only({"UpLeg": thigh, "Leg": shin, "Foot": foot, "Toe": toe})
+
+    def _arm(self, side: int) -> dict[str, int]:
+        clavicle, shoulder = self._first("clavicle", side), self._first("shoulder", side)
+        arm = self._first("upperarm", side, clavicle if clavicle is not None else shoulder)
+        if arm is None:
+            # "Shoulder" is the collar bone where something below is called arm, and else the upper arm.
+            arm = self._first("shoulder", side, clavicle)
+            arm = self._first("upperarm", side) if arm is None else arm
+        if clavicle is None and shoulder != arm:
+            clavicle = shoulder
+        elbow = self._first("forearm", side, arm) if arm is not None else None
+        hand = self._first("hand", side, elbow) if elbow is not None else None
+        return _only({"Shoulder": clavicle, "Arm": arm, "ForeArm": elbow, "Hand": hand})
+
+    def trunk(self, limbs: dict[str, int]) -> dict[str, int]:
+        """Hips, spine, neck and head, from where legs and arms branch off."""
+        legs = [limbs[name] for name in ("LeftUpLeg", "RightUpLeg") if name in limbs]
+        arms = [limbs.get(side + "Shoulder", limbs.get(side + "Arm")) for side in ("Left", "Right")]
+        tops = [joint for joint in arms if joint is not None]
+        if len(legs) < 2 or len(tops) < 2:
+            # Not a whole body: what is called so.
+            parts = {"Hips": "hips", "Spine": "spine", "Neck": "neck", "Head": "head"}
+            return _only({name: self._first(part, 0) for name, part in parts.items()}) | limbs
+        chest = self._meet(tops)
+        hips = limbs.get("Hips", self._meet([*legs, *tops]))
+        if hips is None or chest is None:
+            return {}
+        if "Hips" not in limbs:
+            hips = self._pelvis(hips)
+        if self.said[chest].part == "neck":
+            chest = self.skeleton.parents[chest]  # Bipeds hang their collar bones off the neck
+        found: dict[str, int | None] = {"Hips": hips}
+        spine = self._between(hips, chest)
+        if spine:
+            found["Spine"] = spine[0]
+            found["Spine1"] = spine[len(spine) // 2] if len(spine) > 2 else None
+            found["Spine2"] = spine[-1] if len(spine) > 1 else None
+        up = self._upwards(chest, tops)
+        head = limbs.get("Head", next((j for j in up if self.said[j].part == "head"), up[-1] if up else None))
+        found["Head"] = head
+        found["Neck"] = self._neck(self._between(chest, head)[:-1]) if head is not None else None
+        return _only(found)
+
+    def _upwards(self, chest: int, arms: list[int]) -> list[int]:
+        """The joints of neck and head, in order: those that are called so, or else the middle branch that is
+        longest (Rigify calls them spine, too)."""
+        named = [
+            j for j, said in self.said.items() if said.part == "head" and chest in self.skeleton.ancestors(j)
+        ]
+        if named:
+            return self._between(chest, named[0])
+        aside = {a for arm in arms for a in (arm, *self.skeleton.ancestors(arm))}
+        best: list[int] = []
+        for joint, said in self.said.items():
+            chain = self._between(chest, joint)
+            plain = all(self.said[j].part in ("spine", "neck") and j not in aside for j in chain)
+            if said.part and plain and len(chain) > len(best):
+                best = chain
+        return best
+
+    def _pelvis(self, meeting: int) -> int:
+        """The joint that carries legs and spine: above where they meet, if the pelvis is said to be there.
+
+        Old Bipeds hang their legs off the spine, at the pelvis' own place.
+        """
+        above = self.skeleton.parents[meeting]
+        if above in self.said and self.said[above].part == "hips" and self.said[meeting].part == "spine":
+            return above
+        return meeting
+
+    def _neck(self, necks: list[int]) -> int | None:
+        """The first joint of the neck that is not at the chest's own place (as it is in CMU's skeletons)."""
+        away = np.cumsum(np.linalg.norm(self.skeleton.rest_translation[necks], axis=1))
+        return next((joint for joint, way in zip(necks, away) if way > 1e-6), necks[-1] if necks else None)
+
+    def _meet(self, joints: Iterable[int]) -> int | None:
+        """The lowest joint above all of these."""
+        first, *others = joints
+        return next(
+            (
+                a
+                for a in self.skeleton.ancestors(first)
+                if all(a in self.skeleton.ancestors(b) for b in others)
+            ),
+            None,
+        )
+
+    def _between(self, top: int, end: int) -> list[int]:
+        """The joints from below `top` down to `end`, with it."""
+        chain = [j for j in (end, *self.skeleton.ancestors(end)) if top in self.skeleton.ancestors(j)]
+        return chain[::-1]
+
+
+def _only(found: dict[str, int | None]) -> dict[str, int]:
+    return {name: joint for name, joint in found.items() if joint is not None}

@@ -9,10 +9,10 @@ import torch
 from torch import Tensor
 
 from interpose.datasets import Pack
-from interpose.datasets.pack import STEP
 from interpose.errors import RequestError
 from interpose.skeletons import SIDES
 
+STEP = 1 / 16384  # metres: positions relative to the hips in 16 bits reach 2 m at .06 mm
 SHORTEST = 30  # frames; shorter clips do not train, longer ones than this are padded with their last pose
 
 
@@ -28,11 +28,13 @@ class Windows:
     ) -> None:
         offset, hips, counts = [], [], []
         for pack in packs:
+            positions = pack.positions()
             for clip in range(len(pack.names)):
                 start, stop = pack.starts[clip], pack.starts[clip + 1]
                 if pack.splits[clip] in splits and stop - start >= SHORTEST:
-                    offset.append(pack.offset[start:stop])
-                    hips.append(pack.hips[start:stop])
+                    body = positions[start:stop]
+                    offset.append(np.rint((body - body[:, :1]) / STEP).astype(np.int16))
+                    hips.append(body[:, 0])
                     counts.append(stop - start)
         if not counts:
             raise RequestError(

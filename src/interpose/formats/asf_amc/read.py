@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from interpose import skeletons
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats import place
 from interpose.formats.asf_amc.amc_text import AmcHeader, AmcText, read_amc
 from interpose.formats.asf_amc.asf import Asf, find_asf, read_asf
 from interpose.formats.asf_amc.layout import Layout, bone_vectors, make_layout
-from interpose.skeletons import Mapping, find_mapping
+from interpose.skeletons import find_mapping
 
 FPS = 120.0  # of CMU and HDM05, and of most that is published in this form
 
@@ -69,6 +71,7 @@ def read(
     up: str | None = None,
     skeleton: str | Path | None = None,
     fps: float | None = None,
+    roles: Mapping[str, str] | None = None,
 ) -> Clip:
     """An AMC file and its ASF file as a clip in metres, Y up; `clip.source` is its AmcSource.
 
@@ -82,6 +85,7 @@ def read(
         up: "y" or "z"; estimated from the motion when None.
         skeleton: the skeleton's file; found beside the motion when None, see `find_asf`.
         fps: frames a second; when None what the file says, which few do, else 120.
+        roles: what is said about the joints, see `Skeleton`.
 
     Raises:
         FileError: one of the files is missing or not sound.
@@ -101,7 +105,7 @@ def read(
     rest = bone_vectors(asf)
     frames = place.sample_frames(len(motion))
     turned, moved = raw.decode(np.stack([values[f // motion.chunk][f % motion.chunk] for f in frames]))
-    clip = Clip(Skeleton(names, parents, rest), turned, moved, FPS, raw.translated)
+    clip = Clip(Skeleton(names, parents, rest, roles=roles or {}), turned, moved, FPS, raw.translated)
     mapping = find_mapping(clip.skeleton)
     scale, unit_how = (scale, "given") if scale else _unit(asf, mapping, clip)
     axis, up_how = (axis, "given") if axis else place.estimate_up(mapping, clip)
@@ -109,7 +113,7 @@ def read(
 
     parts = [layout.decode(some) for some in values]
     rotation, translation = (np.concatenate(part) for part in zip(*parts))
-    made = Skeleton(names, parents, place.vectors_inside(rest, scale, axis))
+    made = Skeleton(names, parents, place.vectors_inside(rest, scale, axis), roles=roles or {})
     if fps is not None:
         rate, fps_how = float(fps), "given"
     elif header.fps is not None:
@@ -121,7 +125,7 @@ def read(
     return Clip(made, rotation, translation, rate, layout.translated, path.stem, source)
 
 
-def _unit(asf: Asf, mapping: Mapping, clip: Clip) -> tuple[float, str]:
+def _unit(asf: Asf, mapping: skeletons.Mapping, clip: Clip) -> tuple[float, str]:
     """Metres per file unit, and how it was found.
 
     The specification leaves open what the length unit multiplies to; Vicon's files are in inches times it.

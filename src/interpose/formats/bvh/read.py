@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -64,7 +65,11 @@ class BvhSource:
 
 
 def read(
-    path: Path, unit: float | str | None = None, up: str | None = None, joint_positions: str | None = None
+    path: Path,
+    unit: float | str | None = None,
+    up: str | None = None,
+    joint_positions: str | None = None,
+    roles: Mapping[str, str] | None = None,
 ) -> Clip:
     """A BVH file as a clip in metres, Y up; `clip.source` is its BvhSource.
 
@@ -74,6 +79,7 @@ def read(
         up: "y" or "z"; estimated from the motion when None.
         joint_positions: "replace" or "add": whether position channels replace the OFFSET or are added to it;
             None compares their median with the OFFSET.
+        roles: what is said about the joints, see `Skeleton`.
 
     Position channels of roots replace their OFFSET: in the data that people have (LAFAN1, PFNN, Autodesk and
     Blender exports) the OFFSET of a root is zero or one frame's position, and adding it would move the whole
@@ -99,14 +105,14 @@ def read(
     raw = make_layout(nodes, joint_positions == "add" or positions == "add", 1.0, "y")
     raw = _keep_roots(raw, nodes, joint_positions)
     turned, moved = raw.decode(sample)
-    skeleton = _skeleton(nodes, raw, np.median(moved, axis=0), path)
+    skeleton = replace(_skeleton(nodes, raw, np.median(moved, axis=0), path), roles=roles or {})
     mapping = find_mapping(skeleton)
     clip = Clip(skeleton, turned, moved, header.fps, raw.translated)
 
     scale, unit_how = (scale, "given") if scale else place.estimate_unit(mapping, clip)
     axis, up_how = (axis, "given") if axis else place.estimate_up(mapping, clip)
     layout = replace(raw, unit=scale, up=axis)
-    skeleton = Skeleton(skeleton.names, skeleton.parents, layout.vectors(skeleton.rest_translation))
+    skeleton = replace(skeleton, rest_translation=layout.vectors(skeleton.rest_translation))
 
     rotation = np.empty((len(motion), len(nodes), 4))
     translation = np.empty((len(motion), len(layout.translated), 3))

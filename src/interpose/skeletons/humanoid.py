@@ -1,0 +1,157 @@
+"""A clip's skeleton seen as the canonical humanoid, and back: numbers that mean the same everywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.geometry import kinematics, rotations
+from interpose.skeletons.canonical import BONES, JOINTS, PARENTS
+from interpose.skeletons.mapping import Mapping, find_mapping
+from interpose.skeletons.rest import Rest, find_rest
+
+
+@dataclass(frozen=True, eq=False)
+class Humanoid:
+    """The skeleton of a clip, mapped, with its T-pose.
+
+    A canonical rotation is how a joint is turned from the T-pose, about the axes of the world. It is the
+    joint's own global rotation times a constant, so the way there and back is exact.
+
+    Attributes:
+        clip: the clip; its motion is looked at for what the skeleton itself does not tell.
+        mapping: usable.
+        given: the T-pose, where it is known already; else it is found when it is needed.
+    """
+
+    clip: Clip
+    mapping: Mapping
+    given: Rest | None = None
+
+    @cached_property
+    def rest(self) -> Rest:
+        return self.given or find_rest(self.mapping, self.clip)
+
+    @property
+    def scale(self) -> float:
+        """What positions are multiplied with to give them the canonical leg."""
+        return self.mapping.scale
+
+    def positions(self, clip: Clip) -> np.ndarray:
+        """(F, 22, 3) canonical joints of a clip of this skeleton, in metres, unscaled."""
+        turned, placed = clip.kinematics()
+        positions = np.einsum("cj,fjx->fcx", self.mapping.weights, placed)
+        for row, (joint, bone) in self.mapping.levers.items():
+            at = self._row(joint)
+            inside = rotations.rotate(rotations.conjugate(self.rest.rotation[at]), bone)
+            positions[:, row] = placed[:, joint] + rotations.rotate(turned[:, joint], inside)
+        return positions
+
+    def observed(self, positions: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+        """(F, 22): which canonical positions follow from known positions and local rotations (F, J)."""
+        known = (~positions).astype(float) @ (self.mapping.weights.T > 0) == 0
+        for row, (joint, _) in self.mapping.levers.items():
+            known[:, row] = positions[:, joint] & rotation[:, joint]
+        return known
+
+    def rotations(self, clip: Clip) -> np.ndarray:
+        """(F, 22, 4) canonical rotations of a clip; missing joints turn with their parents."""
+        turned = clip.kinematics()[0]
+        rows, joints = self.mapping.mapped
+        canonical = np.zeros((len(clip), len(JOINTS), 4))
+        canonical[:, rows] = rotations.multiply(
+            turned[:, joints], rotations.conjugate(self.rest.rotation[list(rows)])
+        )
+        for row, joint in enumerate(self.mapping.joints):
+            if joint is None:
+                canonical[:, row] = canonical[:, PARENTS[row]]
+        return canonical
+
+    def root(self, clip: Clip) -> np.ndarray:
+        """(F, 3) where the hips are, in metres, unscaled."""
+        joint = self.mapping["Hips"]
+        assert joint is not None
+        return clip.positions()[:, joint]
+
+    @cached_property
+    def bones(self) -> np.ndarray:
+        """(22, 3) metres, unscaled: where each canonical joint lies from its parent in the T-pose.
+
+        The skeleton's own proportions; where joints between two canonical ones move, as they lie on average.
+        """
+        clip = self.clip if len(self.clip) else None
+        if clip is None:
+            return BONES / self.scale
+        step = max(1, len(clip) // 200)
+        some = clip.with_motion(clip.rotation[::step], clip.translation[::step])
+        points, turned = self.positions(some), self.rotations(some)
+        bones = np.zeros((len(JOINTS), 3))
+        for row, parent in enumerate(PARENTS):
+            if parent >= 0:
+                away = points[:, row] - points[:, parent]
+                bones[row] = rotations.rotate(rotations.conjugate(turned[:, parent]), away).mean(axis=0)
+        return bones
+
+    def to_clip(self, canonical: np.ndarray, root: np.ndarray, like: Clip) -> Clip:
+        """A clip of this skeleton from canonical rotations (F, 22, 4) and the place of the hips (F, 3).
+
+        The inverse of `rotations` and `root`. Joints that are not canonical keep the local rotations and
+        translations of `like`, a clip of this skeleton and as long.
+        """
+        skeleton = self.mapping.skeleton
+        rows, joints = self.mapping.mapped
+        row_of = dict(zip(joints, rows))
+        rotation, turned = like.rotation.copy(), np.empty_like(like.rotation)
+        for joint, parent in enumerate(skeleton.parents):
+            if joint in row_of:
+                own = rotations.multiply(canonical[:, row_of[joint]], self.rest.rotation[row_of[joint]])
+                turned[:, joint] = own
+                above = rotations.conjugate(turned[:, parent]) if parent >= 0 else None
+                rotation[:, joint] = own if above is None else rotations.multiply(above, own)
+            elif parent >= 0:
+                turned[:, joint] = rotations.multiply(turned[:, parent], rotation[:, joint])
+            else:
+                turned[:, joint] = rotation[:, joint]
+        moved = like.with_motion(rotation, like.translation.copy())
+        hips = self.mapping["Hips"]
+        assert hips is not None
+        carrier = next(j for j in (hips, *skeleton.ancestors(hips)) if j in like.translated)
+        shift = root - moved.positions()[:, hips]
+        above = skeleton.parents[carrier]
+        if above >= 0:
+            shift = rotations.rotate(rotations.conjugate(turned[:, above]), shift)
+        moved.translation[:, like.translated.index(carrier)] += shift / skeleton.scale_above[carrier]
+        return moved
+
+    def _row(self, joint: int) -> int:
+        rows, joints = self.mapping.mapped
+        return rows[joints.index(joint)]
+
+
+def canonical_positions(rotation: np.ndarray, root: np.ndarray, bones: np.ndarray) -> np.ndarray:
+    """Forward kinematics of the canonical humanoid.
+
+    Args:
+        rotation: (F, 22, 4) canonical rotations: global, relative to the T-pose.
+        root: (F, 3) the hips.
+        bones: (22, 3) or (F, 22, 3) bones in the T-pose.
+
+    Returns:
+        (F, 22, 3) positions, in the units of the bones.
+    """
+    return kinematics.forward(
+        kinematics.local_rotations(rotation, PARENTS),
+        np.where(np.arange(len(JOINTS))[:, None] == 0, root[:, None], bones),
+        PARENTS,
+    )[1]
+
+
+def find_humanoid(clip: Clip, rest: Rest | None = None) -> Humanoid:
+    """The skeleton of a clip as a humanoid; look at `mapping` for how far it went.
+
+    rest: the T-pose, when more is known of it than this clip tells (from other clips, from a rest frame).
+    """
+    return Humanoid(clip, find_mapping(clip.skeleton), rest)

@@ -1,0 +1,57 @@
+"""A mapping in a JSON file: written by `interpose skeleton --save-map`, corrected by hand, obeyed with --map.
+
+{"root": "Bip01", "joints": {"Hips": "Bip01 Pelvis", "LeftUpLeg": "Bip01 L Thigh", "LeftToe": ""}}
+
+"joints" names the skeleton's own joint for each canonical one; "" or null says that it has none; what is left
+out is found as ever. "root" may name the topmost joint of the character that is meant.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from interpose.errors import FileError, unknown
+from interpose.skeletons.canonical import JOINTS
+from interpose.skeletons.mapping import Mapping
+
+EXAMPLE = '{"joints": {"Hips": "pelvis", "LeftToe": ""}}'
+
+
+def read_map(path: str | Path) -> dict[str, str]:
+    """The roles (see `Skeleton`) that a file gives to joints.
+
+    Raises FileError for what is no such file, and RequestError with a list for an unknown canonical joint.
+    """
+    path = Path(path)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(
+            f"cannot read the map {path}", error.strerror or str(error), "Check the path."
+        ) from None
+    except (ValueError, RecursionError) as error:
+        raise FileError(
+            f"the map {path} is no JSON", str(error).splitlines()[0], f"Write {EXAMPLE}"
+        ) from None
+    joints = content.get("joints") if isinstance(content, dict) else None
+    if not isinstance(joints, dict):
+        raise FileError(f"there is no mapping in {path}", 'it has no object "joints"', f"Write {EXAMPLE}")
+    roles = {str(name): own for name, own in joints.items()}
+    if content.get("root") is not None:
+        roles["root"] = content["root"]
+    for name, own in roles.items():
+        if name not in (*JOINTS, "root"):
+            raise unknown("canonical joint", name, JOINTS)
+        if own is not None and not isinstance(own, str):
+            raise FileError(f"the map {path} is wrong", f"{name} is {own!r}, not a name", f"Write {EXAMPLE}")
+    return {name: own or "" for name, own in roles.items()}
+
+
+def map_text(mapping: Mapping) -> str:
+    """What such a file holds for a mapping, all canonical joints named."""
+    own = [mapping.skeleton.names[joint] if joint is not None else "" for joint in mapping.joints]
+    content: dict[str, object] = {"joints": dict(zip(JOINTS, own))}
+    if root := mapping.skeleton.roles.get("root"):
+        content = {"root": root, **content}
+    return json.dumps(content, indent=2) + "\n"

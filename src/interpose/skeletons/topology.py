@@ -1,0 +1,132 @@
+"""A humanoid by its shape alone: two legs, a trunk, two arms and a head, whatever the joints are called.
+
+Looks at the zero pose, so it finds nothing in skeletons whose zero pose is a heap of bones (LAFAN1's, whose
+names are enough). What does not stand upright in it, such as a horse, is no humanoid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Skeleton
+from interpose.geometry import kinematics
+
+# How much the two sides may differ in length, and how long a limb is at least: shares of the longest reach.
+LIKE, LIMB = 0.08, 0.25
+FOOT = 0.08  # of the leg: a shorter segment after the ankle is no foot
+
+
+@dataclass(frozen=True)
+class _Limb:
+    """A chain of joints, and where in it the two longest neighbouring bones begin."""
+
+    chain: list[int]
+    at: int
+
+    @property
+    def middle(self) -> int:
+        """The knee or elbow."""
+        return self.chain[self.at + 1]
+
+    @property
+    def end(self) -> int:
+        """The ankle or wrist."""
+        return self.chain[self.at + 2]
+
+
+class _Shape:
+    """A skeleton in its zero pose."""
+
+    def __init__(self, skeleton: Skeleton, inside: list[int]) -> None:
+        bones = skeleton.rest_translation * skeleton.scale_above[:, None]
+        self.placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)[1]
+        self.children = {j: [c for c in skeleton.children[j] if c in set(inside)] for j in inside}
+        self.length = np.linalg.norm(bones, axis=1)
+        self.reach = np.zeros(len(skeleton))  # the way from a joint to the furthest end below it
+        for joint in reversed(inside):
+            self.reach[joint] = max(map(self.whole, self.children[joint]), default=0.0)
+
+    def whole(self, joint: int) -> float:
+        """The way to the furthest end, with the joint's own bone."""
+        return float(self.length[joint] + self.reach[joint])
+
+    def chain(self, start: int) -> list[int]:
+        """From a joint down its longest branch."""
+        chain = [start]
+        while self.children[chain[-1]]:
+            chain.append(max(self.children[chain[-1]], key=self.whole))
+        return chain
+
+    def pair(self, joint: int) -> list[_Limb]:
+        """The two limbs of like length that branch off at a joint; empty when there are none."""
+        least = LIMB * self.reach.max()
+        some = sorted(
+            (c for c in self.children[joint] if self.whole(c) > least), key=self.whole, reverse=True
+        )
+        for a, b in zip(some, some[1:]):
+            limbs = [limb for limb in (self.limb(a), self.limb(b)) if limb]
+            if self.whole(a) - self.whole(b) <= LIKE * self.whole(a) and len(limbs) == 2:
+                return limbs
+        return []
+
+    def limb(self, start: int) -> _Limb | None:
+        chain = self.chain(start)
+        if len(chain) < 3:
+            return None
+        sums = np.array([self.length[b] + self.length[c] for b, c in zip(chain[1:], chain[2:])])
+        # The last that are nearly the longest: some collar bones are as long as forearms.
+        return _Limb(chain, int(np.flatnonzero(sums > 0.9 * sums.max(initial=0.0))[-1]) if sums.any() else 0)
+
+
+def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
+    """Canonical joints to the skeleton's own, of those `inside`; nothing when the shape is no humanoid's."""
+    shape = _Shape(skeleton, inside)
+    for hips in inside:
+        legs = shape.pair(hips)
+        starts = [leg.chain[0] for leg in legs]
+        above = [j for c in shape.children[hips] if c not in starts for j in shape.chain(c)] if legs else []
+        chest = next((joint for joint in above if shape.pair(joint)), None)
+        if chest is None:
+            continue
+        up = shape.placed[chest] - shape.placed[hips]
+        down = np.mean([shape.placed[leg.end] for leg in legs], axis=0) - shape.placed[hips]
+        if np.linalg.norm(up) > 1e-6 and up @ down < -0.5 * np.linalg.norm(up) * np.linalg.norm(down):
+            return {"Hips": hips, **_limbs(shape, legs, shape.pair(chest), up), **_head(shape, chest)}
+    return {}
+
+
+def _limbs(shape: _Shape, legs: list[_Limb], arms: list[_Limb], up: np.ndarray) -> dict[str, int]:
+    """Legs and arms by name; feet point ahead, and so tell left from right."""
+    feet = [
+        shape.placed[leg.chain[leg.at + 3]] - shape.placed[leg.end]
+        for leg in legs
+        if leg.end != leg.chain[-1]
+    ]
+    ahead = np.sum(feet, axis=0) if feet else np.array([0.0, 0.0, 1.0])
+    left = np.cross(up, ahead)
+    found: dict[str, int] = {}
+    for limbs, parts in ((legs, ("UpLeg", "Leg", "Foot", "Toe")), (arms, ("Arm", "ForeArm", "Hand"))):
+        apart = shape.placed[limbs[0].middle] - shape.placed[limbs[1].middle]
+        for side, limb in zip(("Left", "Right") if apart @ left > 0 else ("Right", "Left"), limbs):
+            named = dict(zip(parts, limb.chain[limb.at :]))
+            if (
+                "Toe" in named
+                and shape.length[named["Toe"]] < FOOT * shape.length[[limb.middle, limb.end]].sum()
+            ):
+                del named["Toe"]
+            if "Arm" in named and limb.at > 0:
+                named["Shoulder"] = limb.chain[limb.at - 1]
+            found |= {side + part: joint for part, joint in named.items()}
+    return found
+
+
+def _head(shape: _Shape, chest: int) -> dict[str, int]:
+    """Neck and head: the longest branch at the chest that is no arm."""
+    arms = [arm.chain[0] for arm in shape.pair(chest)]
+    others = [joint for joint in shape.children[chest] if joint not in arms]
+    if not others:
+        return {}
+    neck, *head = shape.chain(max(others, key=shape.whole))
+    return {"Neck": neck, "Head": head[0]} if head else {"Head": neck}
