@@ -16,7 +16,7 @@ from interpose.finish import measures
 from interpose.finish.windows import ramp, runs
 from interpose.geometry import rotations
 from interpose.observation import Observation
-from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons import LEG_LENGTH, find_mapping
 
 # A contact is slower than the first speed (metres a second) somewhere and nowhere faster than the second; it
 # is no higher above the floor than HIGH and lasts at least SHORT seconds. What moves further than STEP in it
@@ -44,23 +44,37 @@ class Leg:
     thigh: int
     knee: int
     ankle: int
-    toe: int
+    toe: int | None
+
+    @property
+    def foot(self) -> list[int]:
+        """Ankle and toe; where there is no toe the ankle stands for both."""
+        return [self.ankle, self.ankle if self.toe is None else self.toe]
 
 
 def legs(skeleton: Skeleton) -> tuple[Leg, ...]:
-    """The legs that the skeleton has, by the names of its joints; none when it has no such names."""
-    found = dict(zip(JOINTS, find_mapping(skeleton).joints))
-    chains = [[found[side + part] for part in ("UpLeg", "Leg", "Foot", "Toe")] for side in ("Left", "Right")]
-    return tuple(
-        Leg(*chain)  # type: ignore[arg-type]
-        for chain in chains
-        if None not in chain and all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:]))  # type: ignore[arg-type]
-    )
+    """The legs that the skeleton has; none when they are not found."""
+    mapping = find_mapping(skeleton)
+    found = []
+    for side in ("Left", "Right"):
+        thigh, knee, ankle, toe = (mapping[side + part] for part in ("UpLeg", "Leg", "Foot", "Toe"))
+        if thigh is None or knee is None or ankle is None:
+            continue
+        chain = [joint for joint in (thigh, knee, ankle, toe) if joint is not None]
+        if all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:])):
+            found.append(Leg(thigh, knee, ankle, toe))
+    return tuple(found)
 
 
 def ends(skeleton: Skeleton) -> list[int]:
     """Ankles and toes: the joints by which slide and travel are judged."""
-    return [joint for leg in legs(skeleton) for joint in (leg.ankle, leg.toe)]
+    return [joint for leg in legs(skeleton) for joint in dict.fromkeys(leg.foot)]
+
+
+def size(skeleton: Skeleton) -> float:
+    """How large a body is, 1 for the one for which the lengths and speeds above were chosen: by its legs."""
+    length = find_mapping(skeleton).leg_length
+    return length / LEG_LENGTH if np.isfinite(length) and length > 0 else 1.0
 
 
 def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
@@ -121,8 +135,8 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     feet = ends(clip.skeleton)
     if not feet:
         return []
-    positions = clip.positions()[:, feet]
-    floor = local_floor(positions, known.positions(clip.skeleton)[:, feet], clip.fps)
+    positions, grown = clip.positions()[:, feet], size(clip.skeleton)
+    floor = grown * local_floor(positions / grown, known.positions(clip.skeleton)[:, feet], clip.fps)
     parts = [slice(max(start - 1, 0), stop + 1) for start, stop in ranges]
     slides = [measures.foot_slide(positions[part], clip.fps, floor[part]) for part in parts]
     return list(zip(slides, [measures.foot_travel(positions[part]) for part in parts]))
@@ -142,15 +156,16 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = 
         return clip
     rotation = clip.rotation.copy()
     turned, placed = clip.kinematics()
-    seen = known.positions(skeleton)
+    seen, grown = known.positions(skeleton), size(skeleton)
     inside = np.zeros(len(clip), bool)
     inside[start:stop] = True
     for leg, movable in zip(legs(skeleton), free):
         movable = np.logical_and(movable, inside)
         if not movable.any():
             continue
-        feet = placed[:, [leg.ankle, leg.toe]]
-        floor = local_floor(feet, seen[:, [leg.ankle, leg.toe]], clip.fps)
+        # Seen as those of a body of usual size.
+        feet = placed[:, leg.foot] / grown
+        floor = local_floor(feet, seen[:, leg.foot], clip.fps)
         planted = contacts(feet, floor, clip.fps)
         shift = _hold(feet, planted, movable, clip.fps, over)
         speeds = measures.speed(feet + shift, clip.fps)
@@ -160,7 +175,7 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = 
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = _reach(
-                skeleton, leg, rotation[moved], turned[moved], placed[moved], feet[moved] + shift[moved]
+                skeleton, leg, rotation[moved], turned[moved], placed[moved], grown * (feet + shift)[moved]
             )
     return clip.with_motion(rotation, clip.translation)
 
@@ -247,7 +262,7 @@ def _reach(
     should be, the thigh turns the ankle there by the shortest way, and the foot keeps its direction or turns
     its toe to its goal.
     """
-    hip, knee, ankle, toe = (placed[:, j] for j in (leg.thigh, leg.knee, leg.ankle, leg.toe))
+    hip, knee, ankle, toe = (placed[:, j] for j in (leg.thigh, leg.knee, *leg.foot))
     thigh, shin = knee - hip, ankle - knee
     a, b = (np.linalg.norm(v, axis=-1) for v in (thigh, shin))
     now = np.linalg.norm(ankle - hip, axis=-1)

@@ -238,9 +238,10 @@ class _Chains:
         return None
 
     def _leg(self, side: int) -> dict[str, int]:
-        # A "hip" of one side is the thigh where nothing else is called so.
+        # A "hip" of one side is the thigh where nothing else is called so; the last, after a "hip joint".
         thigh, leg = self._first("thigh", side), self._first("leg", side)
-        thigh = self._first("hip", side) if thigh is None else thigh
+        hips = [joint for joint, said in self.said.items() if said.side == side and said.part == "hip"]
+        thigh = hips[-1] if thigh is None and hips else thigh
         shin = self._first("shin leg", side, thigh) if thigh is not None else self._first("shin", side, leg)
         thigh = leg if thigh is None and shin is not None else thigh
         foot = self._first("ankle foot", side, shin) if shin is not None else None

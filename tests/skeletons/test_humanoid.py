@@ -1,0 +1,164 @@
+"""Canonical rotations: exact there and back, and the same numbers for the same motion on any skeleton."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.skeletons import rigs
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.geometry import rotations
+from interpose.skeletons import BONES, JOINTS, SIDES, canonical_positions, find_humanoid, find_mapping
+from interpose.skeletons.body import facing
+from interpose.skeletons.mirror import mirror
+from interpose.skeletons.rest import find_rest
+
+HEAPS = ("unreal", "vicon", "makehuman", "rigify")  # rigs whose zero pose is none
+
+
+def degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.degrees(rotations.angle(a, b))
+
+
+@pytest.fixture(scope="module")
+def walk(cmu_walk):  # type: ignore[no-untyped-def]
+    return replace(cmu_walk, source=None)
+
+
+@pytest.mark.parametrize("rig", ["cmu", *rigs.RIGS])
+def test_there_and_back_is_exact(walk, rig):
+    clip = walk if rig == "cmu" else rigs.build(rig, walk)[0]
+    body = find_humanoid(clip)
+    back = body.to_clip(body.rotations(clip), body.root(clip), clip)
+    assert rotations.angle(back.rotation, clip.rotation).max() < 1e-5
+    assert np.abs(back.positions() - clip.positions()).max() < 1e-9
+
+
+@pytest.mark.parametrize("rig", [rig for rig in rigs.RIGS if rig not in (*HEAPS, "biped", "child")])
+def test_the_same_motion_is_the_same_numbers(walk, rig):
+    """Rigs that stand in a T-pose, an A-pose or with arms down give CMU's own canonical rotations."""
+    clip, _ = rigs.build(rig, walk)
+    body = find_humanoid(clip)
+    assert body.rest.how == "zero pose"
+    apart = degrees(body.rotations(clip), find_humanoid(walk).rotations(walk))
+    assert apart.max() < (0.1 if body.mapping["Spine1"] is not None else 10)
+
+
+@pytest.mark.parametrize("rig", HEAPS)
+def test_the_motion_tells_the_t_pose_where_the_zero_pose_is_none(walk, rig):
+    """Limbs within ten degrees, the curve of the back and the tilt of the head within fifteen."""
+    clip, _ = rigs.build(rig, walk)
+    body = find_humanoid(clip)
+    assert body.rest.pose == "none"
+    assert body.rest.how == "motion"
+    apart = degrees(body.rotations(clip), find_humanoid(walk).rotations(walk)).mean(axis=0)
+    limbs = [j for j, name in enumerate(JOINTS) if name.endswith(("Leg", "Foot", "Arm"))]
+    assert apart[limbs].max() < 10
+    assert apart.max() < 16
+
+
+def test_in_the_t_pose_all_is_identity(walk):
+    """A skeleton posed as its own T-pose says: no canonical rotation, bones along the axes."""
+    clip, _ = rigs.build("character_creator", walk)
+    body = find_humanoid(clip)
+    still = np.tile([1.0, 0, 0, 0], (1, 22, 1))
+    posed = body.to_clip(still, np.array([[0, 1.0, 0]]), clip.slice(0, 1))
+    points = body.positions(posed)[0]
+    arm = points[JOINTS.index("LeftHand")] - points[JOINTS.index("LeftArm")]
+    leg = points[JOINTS.index("RightFoot")] - points[JOINTS.index("RightUpLeg")]
+    assert rotations.normalize(arm)[0] > 0.999
+    assert rotations.normalize(leg)[1] < -0.999
+    assert abs(float(facing(points[None])[0])) < 0.05
+
+
+@pytest.mark.parametrize("rig", ["smpl", "unreal"])
+def test_turned_moved_and_scaled_motion(walk, rig):
+    clip, _ = rigs.build(rig, walk)
+    body, yaw = find_humanoid(clip), rotations.about("Y", np.array(0.8))
+    root = list(clip.skeleton.roots)
+    rotation, translation = clip.rotation.copy(), rotations.rotate(yaw, clip.translation)
+    rotation[:, root] = rotations.multiply(yaw, rotation[:, root])
+    if len(clip.translated) > 1:
+        translation[:, 1:] = clip.translation[:, 1:]
+    turned = clip.with_motion(rotation, translation)
+    expected = rotations.multiply(yaw, body.rotations(clip))
+    assert degrees(find_humanoid(turned).rotations(turned), expected).max() < 1e-3
+    bigger = replace(
+        clip,
+        skeleton=replace(clip.skeleton, rest_translation=2.5 * clip.skeleton.rest_translation),
+        translation=2.5 * clip.translation,
+    )
+    assert degrees(find_humanoid(bigger).rotations(bigger), body.rotations(clip)).max() < 1e-3
+    assert find_humanoid(bigger).scale == pytest.approx(body.scale / 2.5)
+
+
+def test_a_mirrored_clip_is_the_mirrored_humanoid(walk):
+    body = find_humanoid(walk)
+    own, other = body.rotations(walk), find_humanoid(mirror(walk)).rotations(mirror(walk))
+    assert degrees(other, own[:, list(SIDES)] * [1, 1, -1, -1]).max() < 2
+
+
+def test_forward_kinematics_of_the_humanoid(walk):
+    """Bones, rotations and hips give back the joints, up to what moves between them (CMU's Neck)."""
+    body = find_humanoid(walk)
+    placed = canonical_positions(body.rotations(walk), body.root(walk), body.bones)
+    assert np.linalg.norm(placed - body.positions(walk), axis=-1).max() < 0.02
+    still = canonical_positions(np.tile([1.0, 0, 0, 0], (1, 22, 1)), np.zeros((1, 3)), BONES)[0]
+    assert still[JOINTS.index("LeftHand")] == pytest.approx([0.755, 0.515, -0.041], abs=1e-3)
+
+
+@pytest.mark.parametrize("rig", ["child", "optitrack"])
+def test_derived_joints_are_where_they_would_be(walk, rig):
+    clip, _ = rigs.build(rig, walk)
+    body = find_humanoid(clip)
+    points = body.positions(clip) * body.scale
+    toes = points[:, [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]]
+    ankles = points[:, [JOINTS.index("LeftFoot"), JOINTS.index("RightFoot")]]
+    assert 0.05 < np.linalg.norm(toes - ankles, axis=-1).mean() < 0.25
+    assert (toes[..., 1].min(axis=1) < ankles[..., 1].min(axis=1) + 0.03).mean() > 0.9
+    ahead = np.stack([np.sin(facing(points)), np.zeros(len(points)), np.cos(facing(points))], axis=-1)
+    assert (((toes - ankles) * ahead[:, None]).sum(-1) > 0).mean() > 0.9
+    trunk = points[:, [JOINTS.index(n) for n in ("Hips", "Spine", "Spine1", "Spine2", "Head")], 1]
+    assert (np.diff(trunk, axis=1) > 0).mean() > 0.95
+
+
+def test_a_frame_may_be_the_rest_pose(walk):
+    """In front of the motion stands an A-pose, in a rig whose zero pose is none."""
+    clip, _ = rigs.build("vicon", walk)
+    body = find_humanoid(clip)
+    pose = np.tile([1.0, 0, 0, 0], (1, 22, 1))
+    for side, sign in (("Left", -1), ("Right", 1)):
+        for part in ("Arm", "ForeArm", "Hand"):
+            pose[0, JOINTS.index(side + part)] = rotations.about("Z", np.array(sign * 0.7))
+    rest = body.to_clip(pose, np.array([[0, 1.0, 0]]), clip.slice(0, 1))
+    longer = clip.with_motion(
+        np.concatenate([rest.rotation, clip.rotation]), np.concatenate([rest.translation, clip.translation])
+    )
+    found = find_rest(body.mapping, longer, frame=0)
+    assert found.pose == "A"
+    assert found.how == "frame 0"
+    assert degrees(found.rotation, body.rest.rotation).max() < 8
+    heels = longer.positions()[:, body.mapping["LeftFoot"], 1]
+    with pytest.raises(RequestError, match="no rest pose"):
+        find_rest(body.mapping, longer, frame=int(np.argmax(heels)))
+    with pytest.raises(RequestError, match="no frame 999"):
+        find_rest(body.mapping, longer, frame=999)
+
+
+def test_what_cannot_be_known_is_said(walk):
+    clip, _ = rigs.build("vicon", walk)
+    with pytest.raises(RequestError, match="no motion to tell it"):
+        find_rest(find_mapping(clip.skeleton))
+    legless = replace(walk.skeleton, roles={"LeftLeg": ""})
+    with pytest.raises(RequestError, match="no joints for LeftLeg"):
+        find_rest(find_mapping(legless))
+
+
+def test_a_clip_of_one_frame(walk):
+    one: Clip = rigs.build("vicon", walk)[0].slice(30, 31)
+    body = find_humanoid(one)
+    assert np.isfinite(body.rotations(one)).all()
+    assert np.isfinite(body.bones).all()

@@ -1,0 +1,171 @@
+"""Joints are found on rigs of many tools, by names, by their place, by shape, or as somebody says."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tests.skeletons import rigs
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import FileError, RequestError
+from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons.mapfile import map_text, read_map
+
+
+def named(skeleton: Skeleton) -> dict[str, str]:
+    joints = find_mapping(skeleton).joints
+    return {name: skeleton.names[joint] for name, joint in zip(JOINTS, joints) if joint is not None}
+
+
+def renamed(skeleton: Skeleton, prefix: str = "bone") -> Skeleton:
+    return replace(skeleton, names=tuple(f"{prefix}{j}" for j in range(len(skeleton))))
+
+
+@pytest.mark.parametrize("rig", rigs.RIGS)
+def test_every_rig_is_mapped_without_help(cmu_walk, rig):
+    clip, expected = rigs.build(rig, cmu_walk)
+    assert named(clip.skeleton) == expected
+    mapping = find_mapping(clip.skeleton)
+    assert mapping.usable
+    assert mapping.sure > 0.9
+
+
+@pytest.mark.parametrize("rig", ["mixamo", "smplx", "rokoko", "unity"])
+def test_without_names_the_shape_tells(cmu_walk, rig):
+    clip, expected = rigs.build(rig, cmu_walk)
+    mapping = find_mapping(renamed(clip.skeleton))
+    found = {name: joint for name, joint in zip(JOINTS, mapping.joints) if joint is not None}
+    assert {name: clip.skeleton.names[joint] for name, joint in found.items()} == {
+        name: own for name, own in expected.items() if name in found
+    }
+    assert len(found) >= 19
+    assert mapping.usable
+    assert 0 < mapping.sure < 0.7
+
+
+def test_a_horse_is_no_humanoid(cmu_walk):
+    """The same tree with a level back: arms and legs hang down from it."""
+    clip, _ = rigs.build("smpl", cmu_walk)
+    bones = clip.skeleton.rest_translation.copy()
+    for joint, name in enumerate(clip.skeleton.names):
+        if name.startswith(("Spine", "Neck", "Head")):
+            bones[joint] = bones[joint][[0, 2, 1]]
+        elif name[2:] in ("Elbow", "Wrist", "Hand"):
+            bones[joint] = [0, -abs(bones[joint, 0]), 0]
+    mapping = find_mapping(renamed(replace(clip.skeleton, rest_translation=bones)))
+    assert not mapping.usable
+    assert "Hips" in mapping.lacking
+
+
+@pytest.mark.parametrize(
+    ("own", "said"),
+    [
+        ("lfemur", "LeftUpLeg"),
+        ("thigh_l", "LeftUpLeg"),
+        ("L_Hip", "LeftUpLeg"),
+        ("Bip01 L Thigh", "LeftUpLeg"),
+        ("UpperLeg.L", "LeftUpLeg"),
+        ("LEFT_UPLEG", "LeftUpLeg"),
+        ("character:Left_Up_Leg", "LeftUpLeg"),
+        ("lThighBend", "LeftUpLeg"),
+    ],
+)
+def test_left_and_right_in_every_spelling(cmu_walk, own, said):
+    skeleton = replace(
+        cmu_walk.skeleton, names=tuple(own if n == said else n for n in cmu_walk.skeleton.names), roles={}
+    )
+    mapping = find_mapping(skeleton)
+    assert skeleton.names[mapping[said]] == own
+
+
+def test_what_somebody_says_stands(cmu_walk):
+    skeleton = replace(cmu_walk.skeleton, roles={"LeftHand": "LThumb", "RightToe": ""})
+    mapping = find_mapping(skeleton)
+    assert skeleton.names[mapping["LeftHand"]] == "LThumb"
+    assert mapping.how[JOINTS.index("LeftHand")] == "given"
+    assert mapping["RightToe"] is None
+    others = [name for name in JOINTS if name not in ("LeftHand", "RightToe")]
+    plain = find_mapping(cmu_walk.skeleton)
+    assert all(mapping[name] == plain[name] for name in others)
+
+
+@pytest.mark.parametrize(
+    ("roles", "words"),
+    [
+        ({"Hip": "Hips"}, "Did you mean Hips"),
+        ({"Hips": "Pelvis"}, "unknown joint: Pelvis"),
+        ({"LeftArm": "Hips", "RightArm": "Hips"}, "Hips twice"),
+        ({"root": "nobody"}, "unknown joint: nobody"),
+    ],
+)
+def test_what_somebody_says_wrongly_is_said(cmu_walk, roles, words):
+    with pytest.raises(RequestError, match=words):
+        find_mapping(replace(cmu_walk.skeleton, roles=roles))
+
+
+def test_several_characters_in_one_file(cmu_walk):
+    """Two people and a ball: the first whole one is taken, or the one that is named."""
+    one = cmu_walk.skeleton
+    names = (*(f"A:{n}" for n in one.names), *(f"B:{n}" for n in one.names), "ball")
+    shifted = tuple(p + len(one) if p >= 0 else -1 for p in one.parents)
+    bones = np.concatenate([one.rest_translation, one.rest_translation, np.zeros((1, 3))])
+    both = Skeleton(names, (*one.parents, *shifted, -1), bones)
+    assert both.names[find_mapping(both)["Head"]] == "A:Head"
+    chosen = find_mapping(replace(both, roles={"root": "B:Hips"}))
+    assert {both.names[joint][:2] for joint in chosen.mapped[1]} == {"B:"}
+    assert len(chosen.mapped[0]) == 22
+
+
+def test_a_map_file_says_what_was_found_and_is_read_back(cmu_walk, tmp_path):
+    path = tmp_path / "map.json"
+    path.write_text(map_text(find_mapping(cmu_walk.skeleton)))
+    nameless = renamed(cmu_walk.skeleton)
+    roles = {
+        name: nameless.names[cmu_walk.skeleton.index(own)] if own else ""
+        for name, own in read_map(path).items()
+    }
+    given = find_mapping(replace(nameless, roles=roles))
+    assert given.joints == find_mapping(cmu_walk.skeleton).joints
+    assert given.sure == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("no json", "no JSON"),
+        ("[]", 'no object "joints"'),
+        ('{"joints": {"Hips": 3}}', "not a name"),
+        ('{"joints": {"LeftFinger": "x"}}', "unknown canonical joint"),
+    ],
+)
+def test_bad_map_files(tmp_path, text, words):
+    path = tmp_path / "map.json"
+    path.write_text(text)
+    with pytest.raises((FileError, RequestError), match=words):
+        read_map(path)
+
+
+def test_missing_joints_are_derived(cmu_walk):
+    """Without toes, shoulders and all but one spine joint: weights are sums of one, lengths plausible."""
+    clip, _ = rigs.build("child", cmu_walk)
+    mapping = find_mapping(clip.skeleton)
+    assert set(mapping.missing) == {
+        *("Spine1", "Spine2", "Neck", "LeftShoulder", "RightShoulder", "LeftToe", "RightToe")
+    }
+    ends = [row for row in range(22) if row not in mapping.levers]
+    assert np.allclose(mapping.weights[ends].sum(axis=1), 1)
+    assert set(mapping.levers) == {JOINTS.index("LeftToe"), JOINTS.index("RightToe")}
+
+
+def test_anything_may_be_called_anything(cmu_walk):
+    """Names of any kind never break the mapping."""
+    rng = np.random.default_rng(0)
+    letters = np.array(list("abcLRlr_.:- 0129éß"))
+    for _ in range(50):
+        count = len(cmu_walk.skeleton)
+        names = tuple("".join(rng.choice(letters, rng.integers(1, 9))) + str(j) for j in range(count))
+        find_mapping(replace(cmu_walk.skeleton, names=names))
+    lone = Clip(Skeleton(("x",), (-1,), np.zeros((1, 3))), np.ones((1, 1, 4)) / 2, np.zeros((1, 1, 3)), 30.0)
+    assert not find_mapping(lone.skeleton).usable
