@@ -47,6 +47,37 @@ def infilling(
 
 
 @bench.command
+def skeletons(
+    *,
+    data: Path = Path("data"),
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = 60,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Every data set on its own skeleton and frame rate: error of finished fills, gaps of .5, 1 and 2 s.
+
+    Try:
+      interpose bench skeletons --data data --split test
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        split: validation for development, test for final figures.
+        most: windows of each data set and length of gap, spread over all of them.
+        json: print JSON for other programs.
+        markdown: print only the table, in Markdown.
+    """
+    from interpose.evaluation.skeletons import run
+
+    with _bar() as progress:
+        result = run(data, split, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
 def threshold(
     *,
     data: Path = Path("data"),

@@ -82,13 +82,17 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
     if frame is not None:
         if clip is None or not 0 <= frame < len(clip):
             raise RequestError(
-                f"there is no frame {frame}", f"the clip has {len(clip) if clip else 0} frames"
+                f"there is no frame {frame}",
+                f"the clip has {len(clip) if clip is not None else 0} frames, counted from 0",
+                "Name another one, or leave it out.",
             )
         turned, placed = (some[0] for some in clip.slice(frame, frame + 1).kinematics())
         rest, pose = _from_pose(mapping, turned, placed), _kind(mapping, placed)
         if pose == "none":
             raise RequestError(
-                f"frame {frame} is no rest pose", "the body does not stand upright with straight legs"
+                f"frame {frame} is no rest pose",
+                "the body does not stand upright with straight legs and arms",
+                "Name another one, or leave it out.",
             )
         return Rest(rest, pose, f"frame {frame}")
     bones = skeleton.rest_translation * skeleton.scale_above[:, None]
@@ -98,7 +102,9 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
         return Rest(_from_pose(mapping, turned, placed), pose, "zero pose")
     if clip is None or len(clip) == 0:
         raise RequestError(
-            "the T-pose cannot be found", "the zero pose is none, and there is no motion to tell it"
+            "the T-pose cannot be found",
+            "the zero pose is none, and there is no motion to tell it",
+            "Give a clip with some motion, or name a rest frame.",
         )
     return Rest(_Estimate(mapping, clip).rotation(), pose, "motion")
 

@@ -1,0 +1,105 @@
+"""How a skeleton is understood, shown, saved, corrected, and obeyed by the other verbs."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from tests.skeletons import rigs
+
+from interpose import formats
+from interpose.clip import Clip
+
+
+@pytest.fixture
+def rig(tmp_path: Path, cmu_walk: Clip) -> Path:
+    path = tmp_path / "hero.bvh"
+    formats.save(rigs.build("unreal", cmu_walk)[0], path)
+    return path
+
+
+@pytest.fixture
+def strange(rig: Path) -> Path:
+    """The rig with names that say nothing, in a zero pose that is none: shape does not help either."""
+    lines = rig.read_text().splitlines()
+    for number, line in enumerate(lines):
+        word, _, _ = line.strip().partition(" ")
+        if word in ("ROOT", "JOINT"):
+            lines[number] = f"{word} joint{number}"
+    path = rig.with_name("strange.bvh")
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def test_the_tree_says_what_every_joint_is(run, rig):
+    done = run("skeleton", rig)
+    assert done.code == 0
+    rows = {line.split()[0]: line.split()[1:] for line in done.out.splitlines() if "  " in line.strip()}
+    assert rows["thigh_l"][0] == "LeftUpLeg"
+    assert rows["spine_01"][0] == "Spine"
+    assert rows["upperarm_twist_01_r"][1:] == ["carried", "along"]
+    assert "a humanoid: 22 of the 22" in done.out
+    assert "its zero pose is none, T-pose from the motion" in done.out
+
+
+def test_json_for_programs(run, rig):
+    found = run("skeleton", rig, "--json").json
+    assert found["humanoid"] is True
+    assert found["mapping"]["LeftHand"] == "hand_l"
+    assert "ik_hand_gun" in found["carried_along"]
+    assert found["rest_pose"] == "none"
+    assert found["missing"] == []
+
+
+def test_a_saved_map_is_corrected_and_obeyed(run, rig, tmp_path):
+    assert run("skeleton", rig, "--save-map", "hero.map.json").code == 0
+    content = json.loads((tmp_path / "hero.map.json").read_text())
+    assert content["joints"]["LeftArm"] == "upperarm_l"
+    content["joints"]["LeftToe"] = ""
+    (tmp_path / "hero.map.json").write_text(json.dumps(content))
+    found = run("skeleton", rig, "--map", "hero.map.json", "--json").json
+    assert found["missing"] == ["LeftToe"]
+    assert found["sure"] == 1
+    again = run("skeleton", rig, "--save-map", "hero.map.json")
+    assert again.code == 2
+    assert "exists already" in again.err
+
+
+def test_a_map_lets_the_network_fill_a_strange_skeleton_and_a_report_remembers_it(
+    run, rig, strange, tmp_path
+):
+    assert run("skeleton", strange).code == 4
+    plain = run("fill", strange, "--gap", "60:90", "--method", "cae", "--json", "-o", "plain.bvh")
+    assert plain.json["gaps"][0]["method"] == "spline"
+    assert "--map names them" in json.dumps(plain.json)
+
+    own = dict(zip(formats.load(rig).skeleton.names, formats.load(strange).skeleton.names))
+    joints = run("skeleton", rig, "--json").json["mapping"]
+    roles = {name: own[joint] for name, joint in joints.items()}
+    (tmp_path / "map.json").write_text(json.dumps({"joints": roles}))
+    mapped = ("fill", strange, "--gap", "60:90", "--map", "map.json", "-o", "mapped.bvh", "--json")
+    assert run(*mapped).json["gaps"][0]["method"] == "cae"
+    (tmp_path / "map.json").unlink()
+    assert run("fill", strange, "--gaps", "mapped.json", "-o", "again.bvh").code == 0
+    assert (tmp_path / "again.bvh").read_bytes() == (tmp_path / "mapped.bvh").read_bytes()
+
+
+def test_a_picture_of_the_t_pose(run, rig, tmp_path):
+    assert run("skeleton", rig, "--picture", "pose.svg").code == 0
+    assert (tmp_path / "pose.svg").read_text().startswith("<svg")
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "says"),
+    [
+        (["--map", "no.json"], 3, "cannot read the map"),
+        (["--root", "nobody"], 2, "unknown joint: nobody"),
+        (["--rest-frame", "9999"], 2, "no frame 9999"),
+    ],
+)
+def test_bad_options(run, rig, options, code, says):
+    done = run("skeleton", rig, *options)
+    assert done.code == code
+    assert says in done.err
+    assert len(done.err.strip().splitlines()) == 3
