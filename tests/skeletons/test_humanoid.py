@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 from tests.skeletons import rigs
 
+from interpose import tasks
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.geometry import rotations
+from interpose.observation import Gap
 from interpose.skeletons import BONES, JOINTS, SIDES, canonical_positions, find_humanoid, find_mapping
 from interpose.skeletons.body import facing
+from interpose.skeletons.humanoid import reflect
 from interpose.skeletons.mirror import mirror
 from interpose.skeletons.rest import find_rest
 
@@ -162,3 +165,23 @@ def test_a_clip_of_one_frame(walk):
     body = find_humanoid(one)
     assert np.isfinite(body.rotations(one)).all()
     assert np.isfinite(body.bones).all()
+
+
+@pytest.mark.parametrize("rig", ["smpl", "unreal", "child"])
+def test_left_handed_files_are_seen_in_a_mirror(walk, rig):
+    """The same take written by a program with left-handed axes: the same numbers, and exact back."""
+    clip, _ = rigs.build(rig, walk)
+    written = reflect(clip)
+    body = find_humanoid(written)
+    assert body.left_handed
+    assert not find_humanoid(clip).left_handed
+    assert degrees(body.rotations(written), find_humanoid(clip).rotations(clip)).max() < 1e-3
+    back = body.to_clip(body.rotations(written), body.root(written), written)
+    assert rotations.angle(back.rotation, written.rotation).max() < 1e-6
+
+
+def test_a_left_handed_take_is_filled_as_its_mirror_image(walk):
+    clip, _ = rigs.build("smpl", walk)
+    one, other = (tasks.fill(c, [Gap(60, 90)], "cae") for c in (clip, reflect(clip)))
+    assert other.report.gaps[0].method == "cae"
+    assert np.abs(reflect(other.clip).positions() - one.clip.positions()).max() < 0.01

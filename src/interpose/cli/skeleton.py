@@ -11,7 +11,7 @@ from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
-    from interpose.skeletons import Mapping
+    from interpose.skeletons import Humanoid
     from interpose.skeletons.rest import Rest
 
 HOW = {
@@ -51,13 +51,16 @@ def skeleton(
         force: replace existing files.
     """
     from interpose.cli.outputs import write_text
-    from interpose.skeletons import find_mapping
+    from interpose.skeletons import find_humanoid
     from interpose.skeletons.mapfile import map_text
     from interpose.skeletons.rest import find_rest
 
     clip = reading.load(file)
-    mapping = find_mapping(clip.skeleton)
-    rest = find_rest(mapping, clip, rest_frame) if mapping.usable else None
+    body = find_humanoid(clip)
+    mapping = body.mapping
+    if rest_frame is not None:
+        body = find_humanoid(clip, find_rest(mapping, clip, rest_frame))
+    rest = body.rest if mapping.usable else None
     for path in (save_map, picture):
         if path is not None and path.exists() and not force:
             raise RequestError(
@@ -66,19 +69,21 @@ def skeleton(
     if save_map is not None:
         write_text(save_map, map_text(mapping))
     if picture is not None:
-        write_text(picture, _picture(clip, mapping, rest, file))
+        write_text(picture, _picture(clip, body, file))
     if json:
-        say_json({"input": str(file), **details(clip), **_details(mapping, rest)})
+        say_json({"input": str(file), **details(clip), **_details(body, rest)})
     else:
-        _print(file, clip, mapping, rest)
+        _print(file, clip, body, rest)
         for path in (save_map, picture):
             if path is not None:
                 say(f"wrote {path}")
     return 0 if mapping.usable else 4
 
 
-def _details(mapping: Mapping, rest: Rest | None) -> dict[str, Any]:
+def _details(body: Humanoid, rest: Rest | None) -> dict[str, Any]:
     from interpose.skeletons import JOINTS
+
+    mapping = body.mapping
 
     own = [None if joint is None else mapping.skeleton.names[joint] for joint in mapping.joints]
     used = set(own)
@@ -89,15 +94,17 @@ def _details(mapping: Mapping, rest: Rest | None) -> dict[str, Any]:
         "how": {name: how for name, how in zip(JOINTS, mapping.how) if how},
         "missing": list(mapping.missing),
         "carried_along": [name for name in mapping.skeleton.names if name not in used],
+        "left_handed": body.left_handed,
         "leg": mapping.leg_length if mapping.usable else None,
         "rest_pose": None if rest is None else rest.pose,
         "rest_pose_how": None if rest is None else rest.how,
     }
 
 
-def _print(file: Path, clip: Clip, mapping: Mapping, rest: Rest | None) -> None:
+def _print(file: Path, clip: Clip, body: Humanoid, rest: Rest | None) -> None:
     from interpose.skeletons import JOINTS
 
+    mapping = body.mapping
     say("\n".join(describe(file, clip)))
     role = {joint: (name, how) for name, joint, how in zip(JOINTS, mapping.joints, mapping.how)}
     count = len(mapping.mapped[0])
@@ -105,6 +112,8 @@ def _print(file: Path, clip: Clip, mapping: Mapping, rest: Rest | None) -> None:
         say(f"  a humanoid: {count} of the 22 joints that networks know, {100 * mapping.sure:.0f} % sure")
         zero = "its zero pose is none" if rest.pose == "none" else f"its zero pose: {rest.pose}"
         say(f"  leg {mapping.leg_length:.2f} m; {zero}, T-pose from the {rest.how}")
+        if body.left_handed:
+            say("  left-handed: its knees bend forward, so networks see it in a mirror")
     else:
         lacking = ", ".join(mapping.lacking)
         say(f"  no humanoid: nothing found for {lacking}")
@@ -122,19 +131,18 @@ def _print(file: Path, clip: Clip, mapping: Mapping, rest: Rest | None) -> None:
         say(f"missing, so derived from the others: {', '.join(mapping.missing)}")
 
 
-def _picture(clip: Clip, mapping: Mapping, rest: Rest | None, file: Path) -> str:
+def _picture(clip: Clip, body: Humanoid, file: Path) -> str:
     """The T-pose (or without a humanoid the zero pose) and a frame of the motion, side by side."""
     import numpy as np
 
     from interpose.show import Take, strip
-    from interpose.skeletons import JOINTS, PARENTS, find_humanoid
+    from interpose.skeletons import JOINTS, PARENTS
     from interpose.skeletons.humanoid import canonical_positions
 
-    if rest is None:
+    if not body.mapping.usable:
         raise RequestError(
             "there is no T-pose to draw", "the skeleton is no humanoid", "Map it first: --save-map, --map."
         )
-    body = find_humanoid(clip, rest)
     turned = body.rotations(clip)
     still = np.zeros_like(turned[:1])
     still[..., 0] = 1.0

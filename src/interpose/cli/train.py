@@ -20,15 +20,22 @@ SPLITS = ("train", "validation")
 
 
 def load_packs(folder: Path) -> list[Pack]:
-    """The packs in a folder, by name. Raises FileError when there are none."""
-    from interpose.datasets import Pack
+    """The packs in a folder, by name, but for data that trains no weights that are given away.
+
+    Raises FileError when there are none.
+    """
+    from interpose.datasets import Pack, trains_shipped_weights
 
     paths = sorted(folder.glob("*.npz"))
     if not paths:
         raise FileError(
             f"no packs in {folder}", "it has no .npz file", f"Make them: interpose data pack --out {folder}"
         )
-    return [Pack.load(path) for path in paths]
+    packs = [Pack.load(path) for path in paths]
+    for pack in packs:
+        if not trains_shipped_weights(str(pack.dataset)):
+            say(f"{pack.dataset} is left out: it tests, and trains no weights that are given away")
+    return [pack for pack in packs if trains_shipped_weights(str(pack.dataset))]
 
 
 def check_splits(texts: list[str]) -> tuple[str, ...]:

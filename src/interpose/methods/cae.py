@@ -154,7 +154,7 @@ class Cae:
         drift = self._drift(observation, raw, completed, times, body)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
-        spoken, own = (sample_smooth(out, back) / body.scale for out in (completed, poses))
+        spoken, own = (sample_smooth(out, back) * (body.hand / body.scale) for out in (completed, poses))
         rows, joints = body.mapping.mapped
         notes = {"model": card.name, "drift": drift}
         return Raw(base, spoken[:, rows], joints, notes, own[:, rows])

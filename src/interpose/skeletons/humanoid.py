@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,6 +21,9 @@ class Humanoid:
     A canonical rotation is how a joint is turned from the T-pose, about the axes of the world. It is the
     joint's own global rotation times a constant, so the way there and back is exact.
 
+    Some programs write left-handed axes: read as right-handed ones, the body is its own mirror image, whose
+    knees bend forward. Such a clip is reflected on the way to canonical numbers, and back.
+
     Attributes:
         clip: the clip; its motion is looked at for what the skeleton itself does not tell.
         mapping: usable.
@@ -33,7 +36,25 @@ class Humanoid:
 
     @cached_property
     def rest(self) -> Rest:
-        return self.given or find_rest(self.mapping, self.clip)
+        """The T-pose, of the reflected skeleton if the clip is left-handed."""
+        if self.given:
+            return self.given
+        clip = self._right(self.clip)
+        return find_rest(replace(self.mapping, skeleton=clip.skeleton), clip)
+
+    @cached_property
+    def left_handed(self) -> bool:
+        """Whether the clip is its own mirror image: its knees bend forward, by where left and right are."""
+        return knees_bend_forward(self.mapping, self.clip)
+
+    @property
+    def hand(self) -> np.ndarray:
+        """(3,) what positions of the clip are multiplied with to give right-handed ones, and back."""
+        return np.array([-1.0 if self.left_handed else 1.0, 1.0, 1.0])
+
+    def _right(self, clip: Clip) -> Clip:
+        """A clip of this skeleton as a right-handed one."""
+        return reflect(clip) if self.left_handed else clip
 
     @property
     def scale(self) -> float:
@@ -42,7 +63,7 @@ class Humanoid:
 
     def positions(self, clip: Clip) -> np.ndarray:
         """(F, 22, 3) canonical joints of a clip of this skeleton, in metres, unscaled."""
-        turned, placed = clip.kinematics()
+        turned, placed = self._right(clip).kinematics()
         positions = np.einsum("cj,fjx->fcx", self.mapping.weights, placed)
         for row, (joint, bone) in self.mapping.levers.items():
             at = self._row(joint)
@@ -59,7 +80,7 @@ class Humanoid:
 
     def rotations(self, clip: Clip) -> np.ndarray:
         """(F, 22, 4) canonical rotations of a clip; missing joints turn with their parents."""
-        turned = clip.kinematics()[0]
+        turned = self._right(clip).kinematics()[0]
         rows, joints = self.mapping.mapped
         canonical = np.zeros((len(clip), len(JOINTS), 4))
         canonical[:, rows] = rotations.multiply(
@@ -74,7 +95,7 @@ class Humanoid:
         """(F, 3) where the hips are, in metres, unscaled."""
         joint = self.mapping["Hips"]
         assert joint is not None
-        return clip.positions()[:, joint]
+        return clip.positions()[:, joint] * self.hand
 
     @cached_property
     def bones(self) -> np.ndarray:
@@ -101,6 +122,11 @@ class Humanoid:
         The inverse of `rotations` and `root`. Joints that are not canonical keep the local rotations and
         translations of `like`, a clip of this skeleton and as long.
         """
+        if self.left_handed:
+            right = self._right(like)
+            own = Humanoid(right, replace(self.mapping, skeleton=right.skeleton), self.rest)
+            done = reflect(own.to_clip(canonical, root, right))
+            return like.with_motion(done.rotation, done.translation)
         skeleton = self.mapping.skeleton
         rows, joints = self.mapping.mapped
         row_of = dict(zip(joints, rows))
@@ -129,6 +155,38 @@ class Humanoid:
     def _row(self, joint: int) -> int:
         rows, joints = self.mapping.mapped
         return rows[joints.index(joint)]
+
+
+def reflect(clip: Clip) -> Clip:
+    """The clip seen in a mirror at X = 0, with its local axes: left stays left, handedness changes."""
+    turn, move = np.array([1.0, 1.0, -1.0, -1.0]), np.array([-1.0, 1.0, 1.0])
+    skeleton = replace(
+        clip.skeleton,
+        rest_translation=clip.skeleton.rest_translation * move,
+        rest_rotation=clip.skeleton.rest_rotation * turn,
+    )
+    return replace(
+        clip,
+        skeleton=skeleton,
+        rotation=clip.rotation * turn,
+        translation=clip.translation * move,
+        source=None,
+    )
+
+
+def knees_bend_forward(mapping: Mapping, clip: Clip) -> bool:
+    """Whether knees bend the wrong way, as seen from left and right, in the mean over a clip."""
+    if not mapping.usable or len(clip) == 0:
+        return False
+    step = max(1, len(clip) // 100)
+    placed = clip.with_motion(clip.rotation[::step], clip.translation[::step]).positions()
+    points = np.einsum("cj,fjx->fcx", mapping.weights, placed)
+
+    def way(start: str, end: str) -> np.ndarray:
+        return rotations.normalize(points[:, JOINTS.index(end)] - points[:, JOINTS.index(start)])
+
+    bends = [np.cross(way(s + "UpLeg", s + "Leg"), way(s + "Leg", s + "Foot")) for s in ("Left", "Right")]
+    return bool((sum(bends) * way("RightUpLeg", "LeftUpLeg")).sum(-1).mean() < 0)
 
 
 def canonical_positions(rotation: np.ndarray, root: np.ndarray, bones: np.ndarray) -> np.ndarray:
