@@ -18,10 +18,10 @@ os.environ["OMP_NUM_THREADS"] = "1"
 sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import numpy as np
+from tests.skeletons import rigs
 
 from interpose import formats
 from interpose.skeletons import find_humanoid, find_mapping
-from tests.skeletons import rigs
 
 FRAMES = 10_000
 

@@ -107,6 +107,14 @@ def test_demo(run, tmp_path):
         assert word in done.out
 
 
+def test_demo_of_a_rig_with_fingers(run, tmp_path):
+    done = run("demo", "fingers", "--out", "here")
+    assert done.code == 0
+    assert "65 joints" in done.out
+    assert "filled (cae)" in done.out
+    assert (tmp_path / "here" / "fingers.filled.bvh").stat().st_size > 100_000
+
+
 def test_demo_needs_a_folder(run, tmp_path):
     (tmp_path / "demo").write_text("a file")
     done = run("demo")

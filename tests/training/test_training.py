@@ -119,10 +119,11 @@ def test_a_run_from_shipped_weights_begins_with_them_and_keeps_their_history(pac
     for name, value in model.state_dict().items():
         shipped = numpy_helper.to_array(held[name]).astype(np.float32)
         assert np.allclose(value, shipped, atol=1e-6), name
-    history = json.loads((tmp_path / "earlier.json").read_text())
+    history = json.loads((tmp_path / "earlier.json").read_text())["training"]
     assert history[-1]["budget"] == card.training["budget"]
     new = export_cae(tmp_path, [pack], tmp_path / "out", ["train"])
     assert new.training["steps"] == card.training["steps"] + 2
     assert new.training["earlier"] == history
+    assert new.auto == card.auto, "thresholds stay as measured on performers that were held out then"
     log = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
     assert [entry["step"] for entry in log] == sorted(entry["step"] for entry in log)

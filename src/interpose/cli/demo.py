@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from importlib import resources
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from cyclopts import Parameter
 
@@ -20,36 +20,52 @@ GAP = 66, 96  # the middle second of the bundled clip
 FILLED, PLAIN, TRUTH = "#d1495b", "#2e86ab", "#6b7280"
 
 
-def example(folder: Path) -> Path:
-    """The bundled clip, copied into a folder."""
-    path = folder / "walk.bvh"
-    path.write_bytes((resources.files("interpose") / "examples" / "walk.bvh").read_bytes())
+def example(folder: Path, name: str) -> Path:
+    """A bundled clip, copied into a folder."""
+    path = folder / f"{name}.bvh"
+    path.write_bytes((resources.files("interpose") / "examples" / path.name).read_bytes())
     return path
 
 
-def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")) -> None:
+def demo(
+    clip: Literal["walk", "fingers"] = "walk",
+    /,
+    *,
+    out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo"),
+) -> None:
     """See a gap filled in a real clip.
 
     Someone walks, and the middle second is taken away. The demo fills it, compares
     with plain interpolation and with what was taken away, and writes the filled
     clip, a strip of stick figures, and a page that plays it in any browser.
 
+    Try:
+      interpose demo
+      interpose demo fingers
+
     Args:
+        clip: walk, as it was captured; or fingers, the same walk on a game rig of 65 joints.
         out: the folder; files of an earlier demo in it are replaced.
     """
-    from interpose import tasks
-    from interpose.cli.outputs import write_text
-    from interpose.formats import load, save
-    from interpose.observation import Gap
-    from interpose.show import Take, player, strip
+    from interpose.formats import load
 
     try:
         out.mkdir(parents=True, exist_ok=True)
-        path = example(out)
+        path = example(out, clip)
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot write into {out}", why, "Choose another folder with --out.") from None
-    clip = load(path)
+    _show(load(path), out, clip)
+
+
+def _show(clip: Clip, out: Path, name: str) -> None:
+    """Fill the gap, write all files and say what came out."""
+    from interpose import tasks
+    from interpose.cli.outputs import write_text
+    from interpose.formats import save
+    from interpose.observation import Gap
+    from interpose.show import Take, player, strip
+
     gap = Gap(*GAP)
     filled, plain = tasks.fill(clip, [gap]), tasks.fill(clip, [gap], "linear")
     takes = [
@@ -58,7 +74,7 @@ def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")
         Take("filled", filled.clip.positions(), FILLED),
     ]
     text = str(filled.report)
-    save(filled.clip, out / "walk.filled.bvh", force=True)
+    save(filled.clip, out / f"{name}.filled.bvh", force=True)
     joints, parents = clip.skeleton.names, clip.skeleton.parents
     picture = strip(takes, parents, clip.fps, [gap], title="A second of a walk", names=joints)
     write_text(out / "strip.svg", picture)
@@ -66,7 +82,8 @@ def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")
     write_text(out / "player.html", page)
 
     method = filled.report.gaps[0].method
-    say(f"A walk of {clip.seconds:.1f} s from the CMU motion capture database (mocap.cs.cmu.edu).")
+    rig = "" if name == "walk" else f", on a rig of {len(clip.skeleton)} joints"
+    say(f"A walk of {clip.seconds:.1f} s from the CMU motion capture database (mocap.cs.cmu.edu){rig}.")
     where = f"Frames {gap.start} to {gap.stop - 1} ({seconds(len(gap), clip.fps)})"
     say(f"{where} were taken away and filled by {method}.")
     say()
@@ -93,7 +110,7 @@ def demo(*, out: Annotated[Path, Parameter(name=("--out", "-o"))] = Path("demo")
         f"Open   {out / 'player.html'} in a browser: truth, interpolation and the filled clip over each other"
     )
     say(f"       {out / 'strip.svg'}: the same as stick figures over time")
-    say(f"       {out / 'walk.filled.bvh'} in your own tool")
+    say(f"       {out / f'{name}.filled.bvh'} in your own tool")
     say("Then   interpose scan YOUR.bvh                        what is missing in your clip")
     say("       interpose fill YOUR.bvh --gap 120:160 --player  fill frames 120 to 159 of it")
 

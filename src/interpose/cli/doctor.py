@@ -104,7 +104,7 @@ def _fill() -> str:
     from interpose.observation import Gap
 
     with tempfile.TemporaryDirectory() as folder:
-        clip = load(example(Path(folder)))
+        clip = load(example(Path(folder), "walk"))
         start = time.perf_counter()
         done = tasks.fill(clip, [Gap(*GAP)])
         spent = time.perf_counter() - start

@@ -73,7 +73,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     out.mkdir(parents=True, exist_ok=True)
     export_onnx(model, out / "cae.onnx")
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
-    log, earlier = _history(folder)
+    log, earlier, auto = _history(folder)
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
     hours = [entry["hours"] for entry in log]
     line_plot(
@@ -113,7 +113,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         fps=30.0,
         max_gap=60,
         training={
-            "recipe": "interpose train cae",
+            "recipe": "interpose train cae" + (" --start cae" if earlier else ""),
             **settings,
             "splits": splits,
             "steps": log[-1]["step"],
@@ -127,25 +127,31 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
             },
         },
         metrics={"validation": log[-1]},
-        # Not measured yet: auto leaves every gap to the spline until `interpose bench threshold --save`.
-        auto={"from_gap": 61},
+        auto=auto,
     )
     card.save(out / "cae.json")
     return card
 
 
-def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    """The log of a run, after that of the weights that it started from; and what their card said of them."""
+def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], dict[str, Any]]:
+    """The log of a run, after that of the weights that it started from; what their card said of their
+    training; and what `auto` goes by.
+
+    The latter stays as measured on them: a run that goes on may train on the performers that it was measured
+    with. Of a first run it is not measured yet, so that all gaps are the spline's until
+    `interpose bench threshold --save`.
+    """
 
     def lines(name: str) -> list[dict[str, Any]]:
         return [json.loads(line) for line in (folder / name).read_text().splitlines()]
 
     if not (folder / "earlier.json").exists():
-        return lines("log.jsonl"), []
+        return lines("log.jsonl"), [], {"from_gap": 61}
     before = lines("earlier.jsonl")
     steps, hours = before[-1]["step"], before[-1]["hours"]
     after = [
         {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
         for entry in lines("log.jsonl")
     ]
-    return before + after, json.loads((folder / "earlier.json").read_text())
+    kept = json.loads((folder / "earlier.json").read_text())
+    return before + after, kept["training"], kept["auto"]
