@@ -11,6 +11,7 @@ from typing import Literal
 from cyclopts import App
 
 from interpose.cli.console import console, say, say_json
+from interpose.errors import RequestError
 
 bench = App(name="bench", help="Measure how good the methods are, by published protocols.")
 
@@ -75,6 +76,55 @@ def skeletons(
         say_json(result.to_dict())
     else:
         say(result.table() if markdown else str(result))
+
+
+@bench.command
+def lafan1(
+    *,
+    data: Path = Path("data"),
+    method: list[str] = [],  # noqa: B006
+    protocol: Literal["official", "cmib"] = "official",
+    gaps: str | None = None,
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    plot: Path | None = None,
+    json: bool = False,
+) -> None:
+    """LAFAN1 in-betweening (Harvey et al. 2020): L2P, L2Q and NPSS exactly as its authors measure them.
+
+    Zero-velocity and interpolation stand first, then each --method as users get it,
+    finished, with what the field does not print: feet, pop at keys, bones, time.
+
+    Try:
+      interpose bench lafan1 --data data --split test --method cae
+      interpose bench lafan1 --data data --gaps 5,15,30,45,60,80,120
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        method: a method to measure, by name, also one of another package. May be repeated.
+        protocol: official; or cmib, as Kim et al. 2022 count: lengths with both keys, one frame of context.
+        gaps: lengths in frames, separated by commas; those of the protocol without it.
+        split: validation (subject 4) for development, test (subject 5) for final figures.
+        most: windows, spread over all of them; all without it.
+        plot: an SVG file to draw the ratios to interpolation into.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.lafan1 import run
+
+    try:
+        lengths = [int(text) for text in gaps.split(",")] if gaps else []
+    except ValueError:
+        raise RequestError(
+            f"cannot read --gaps {gaps}", "it is a list of numbers of frames", "Write --gaps 5,15,30,45."
+        ) from None
+    with _bar() as progress:
+        result = run(data, split, protocol, lengths, method, most, progress)
+    if plot is not None:
+        result.plot(plot)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(str(result))
 
 
 @bench.command

@@ -1,0 +1,174 @@
+"""The benchmark of LAFAN1 on small files in its format: metrics, windows, rows, and that nothing leaks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose import formats
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.evaluation import lafan1
+from interpose.evaluation.lafan1 import PROTOCOLS, cut, forward, l2p, l2q, npss, resign
+from interpose.geometry import kinematics, rotations
+from interpose.skeletons import BONES, JOINTS, PARENTS, find_humanoid
+
+# The axes of LAFAN1's joints in the T-pose: X up, Y ahead, Z to the left.
+AXES = rotations.from_matrix(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]))
+
+
+@pytest.fixture(scope="module")
+def sequence(cmu_walk):  # type: ignore[no-untyped-def]
+    """A real walk on a skeleton with LAFAN1's joints and axes, there and back again."""
+    turned = rotations.multiply(find_humanoid(cmu_walk).rotations(cmu_walk), AXES)
+    bones = rotations.rotate(rotations.conjugate(AXES), BONES)
+    order = np.concatenate([np.arange(209), np.arange(209)[::-1]])
+    local = kinematics.local_rotations(turned, PARENTS)[order]
+    skeleton = Skeleton(JOINTS, PARENTS, bones)
+    return Clip(skeleton, local, cmu_walk.root[order, None], 30.0, name="walk1_subject4")
+
+
+@pytest.fixture(scope="module")
+def published(sequence, tmp_path_factory):  # type: ignore[no-untyped-def]
+    """The published layout: subjects 1, 4 and 5 with a sequence each, and a cut that only trains."""
+    folder = tmp_path_factory.mktemp("data")
+    for name in ("bvh/walk1_subject1", "bvh/run1_subject4", "bvh/jumps1_subject5", "cuts/fight1_subject2_a"):
+        path = folder / "lafan1" / f"{name}.bvh"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        formats.save(sequence, path)
+    return folder
+
+
+def test_windows_are_cut_centred_and_turned_as_the_authors_do(sequence):
+    windows = cut([sequence], 65, 40, sequence.skeleton.rest_translation)
+    assert len(windows) == len(range(0, len(sequence) - 65, 40)), "strict: start + 65 < frames"
+    assert np.abs(windows.root.mean(axis=1)[:, [0, 2]]).max() < 1e-9
+    ahead = rotations.rotate(windows.rotation[:, 9, 0], np.array([0.0, 1, 0]))
+    assert np.abs(ahead[:, 2]).max() < 1e-9
+    assert (ahead[:, 0] > 0.9).all()
+    _, placed = forward(windows.rotation, windows.root, windows.bones)
+    own = sequence.positions()[40:105]
+    height = placed[1, :, :, 1]
+    assert np.allclose(height, own[..., 1], atol=1e-9), "turned about the vertical only"
+
+
+def test_metrics_against_their_definition(sequence):
+    windows = cut([sequence], 65, 40, sequence.skeleton.rest_translation)
+    turned, placed = forward(windows.rotation, windows.root, windows.bones)
+    statistics = lafan1.Statistics(placed.reshape(-1, 66).mean(0), placed.reshape(-1, 66).std(0))
+    rng = np.random.default_rng(0)
+    moved = placed + rng.normal(0, 0.01, placed.shape)
+    other = rotations.multiply(turned, rotations.exp(rng.normal(0, 0.1, (*turned.shape[:-1], 3))))
+    slow_p, slow_q = [], []
+    for w in range(len(windows)):
+        for f in range(65):
+            off = (moved[w, f] - placed[w, f]).ravel() / statistics.std
+            slow_p.append(np.sqrt((off**2).sum()))
+            slow_q.append(np.sqrt(((other[w, f] - turned[w, f]) ** 2).sum()))
+    assert l2p(moved, placed, statistics).mean() == pytest.approx(np.mean(slow_p))
+    assert l2q(other, turned).mean() == pytest.approx(np.mean(slow_q))
+
+    total, weights = 0.0, 0.0
+    for w in range(len(windows)):
+        for j in range(22):
+            for k in range(4):
+                power = [np.real(np.fft.fft(q[w, :, j, k])) ** 2 for q in (other, turned)]
+                shares = [np.cumsum(p) / p.sum() for p in power]
+                total += np.abs(shares[0] - shares[1]).sum() * power[1].sum()
+                weights += power[1].sum()
+    assert npss(other, turned) == pytest.approx(total / weights)
+    assert npss(turned, turned) == 0
+
+
+def test_signs_follow_the_context(sequence):
+    """The truth with random signs scores zero; the truth itself is never asked."""
+    windows = cut([sequence], 65, 40, sequence.skeleton.rest_translation)
+    part = slice(10, 40)
+    signs = np.random.default_rng(1).choice([-1.0, 1.0], windows.rotation[:, part].shape[:-1])
+    said = resign(windows.rotation[:, part] * signs[..., None], windows.rotation[:, 9])
+    turned = forward(said, windows.root[:, part], windows.bones)[0]
+    truth = forward(windows.rotation[:, part], windows.root[:, part], windows.bones)[0]
+    assert l2q(turned, truth).max() < 1e-12
+
+
+def test_interpolation_is_the_authors(published):
+    """LERP of the hips and SLERP of local rotations with weights linspace(0, 1, gap + 2)."""
+    held = lafan1.load(published, "validation")
+    windows = cut(held.sequences, 65, 40, held.bones)
+    row = lafan1.measure(held, PROTOCOLS["official"], windows, 15, "linear", False)
+    share = np.linspace(0, 1, 17)[1:-1]
+    root = windows.root[:, 9:10] + share[None, :, None] * (windows.root[:, 25:26] - windows.root[:, 9:10])
+    local = rotations.slerp(windows.rotation[:, 9:10], windows.rotation[:, 25:26], share[None, :, None])
+    _, placed = forward(local, root, windows.bones)
+    truth = forward(windows.rotation[:, 10:25], windows.root[:, 10:25], windows.bones)[1]
+    assert row.l2p == pytest.approx(l2p(placed, truth, held.statistics).mean(), rel=1e-6)
+
+
+@pytest.mark.parametrize("protocol", list(PROTOCOLS))
+def test_the_truth_itself_scores_zero(published, protocol, monkeypatch):
+    held, rules = lafan1.load(published, "validation"), PROTOCOLS[protocol]
+    windows = cut(held.sequences, rules.window(30), 40, held.bones)
+    clips = list(lafan1._clips(held, rules, windows, 30))
+    missing = slice(*(frame - rules.shown(30).start for frame in rules.hidden(30)))
+    monkeypatch.setattr(lafan1, "fill", lambda clip, *_: (clip, missing))
+    row = lafan1.measure(held, rules, windows, 30, "spline", False)
+    assert len(clips[0]) == 41 if protocol == "official" else 30
+    assert max(row.l2p, row.l2q, row.npss) < 1e-9
+
+
+@pytest.mark.parametrize("protocol", list(PROTOCOLS))
+@pytest.mark.parametrize("method", ["zero-velocity", "linear", "spline", "cae"])
+def test_nothing_leaks(published, protocol, method):
+    """Neither hidden frames nor those after the target nor those before the context change what comes out."""
+    held, rules = lafan1.load(published, "validation"), PROTOCOLS[protocol]
+    windows = cut(held.sequences, rules.window(20), 40, held.bones).spread(2)
+    poisoned = lafan1.Windows(windows.rotation.copy(), windows.root.copy(), windows.bones, windows.names)
+    shown, hidden = rules.shown(20), slice(*rules.hidden(20))
+    for part in (slice(0, shown.start), hidden, slice(shown.stop, None)):
+        poisoned.rotation[:, part] = [0.5, -0.5, 0.5, 0.5]
+        poisoned.root[:, part] = 9.0
+    for one, other in zip(
+        lafan1._clips(held, rules, windows, 20), lafan1._clips(held, rules, poisoned, 20), strict=True
+    ):
+        a, missing = lafan1.fill(one, rules, 20, method, method == "cae")
+        b, _ = lafan1.fill(other, rules, 20, method, method == "cae")
+        assert a.rotation[missing].tobytes() == b.rotation[missing].tobytes()
+        assert a.translation[missing].tobytes() == b.translation[missing].tobytes()
+
+
+def test_the_whole_benchmark(published):
+    result = lafan1.run(published, "test", gaps=(5, 15), methods=("spline",))
+    assert result.name == "LAFAN1 s5-1"
+    assert list(result.rows) == ["zero-velocity", "linear", "spline", "spline, finished"]
+    assert result.ratio("linear", 5, "l2p") == 1
+    assert result.ratio("zero-velocity", 15, "l2p") > 1 > result.ratio("spline", 15, "l2p")
+    assert result.rows["spline, finished"][15].bones < 1e-6
+    assert result.to_dict()["rows"]["linear"]["5"]["ratios"]["l2q"] == 1
+    assert "| zero-velocity |" in str(result)
+    assert result.plot().startswith("<svg")
+
+
+def test_the_protocol_of_cmib(published):
+    """Lengths count the two keys, which are judged too; leaf joints have no rotation of their own."""
+    rules = PROTOCOLS["cmib"]
+    assert rules.hidden(30) == (10, 38)
+    assert rules.judged(30) == slice(9, 39)
+    assert rules.shown(30) == slice(9, 39)
+    assert (rules.window(40), rules.window(80)) == (65, 90)
+    result = lafan1.run(published, "test", "cmib", (30,))
+    assert result.ratio("linear, global", 30, "l2p") == 1
+    assert result.rows["linear"][30].l2p > 0
+
+
+def test_extended_gaps_have_windows_of_their_own():
+    rules = PROTOCOLS["official"]
+    assert [rules.window(gap) for gap in (5, 45, 60, 120)] == [65, 65, 140, 140]
+
+
+def test_wrong_requests(published):
+    with pytest.raises(RequestError, match="official, cmib"):
+        lafan1.run(published, protocol="offical")
+    with pytest.raises(RequestError, match="300 frames"):
+        lafan1.run(published, gaps=(300,))
+    with pytest.raises(RequestError, match="unknown method"):
+        lafan1.run(published, methods=("nothing",))
