@@ -11,7 +11,8 @@ torch = pytest.importorskip("torch")
 
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods.cae import LENGTH, run, run_long, starts  # noqa: E402
-from interpose.models.cae import Autoencoder, Infiller, integrate, neighbours, settle, to_image  # noqa: E402
+from interpose.models.cae import Autoencoder, Infiller, integrate, settle, to_image  # noqa: E402
+from interpose.models.keys import neighbours  # noqa: E402
 from interpose.skeletons import JOINTS, SIDES, find_humanoid  # noqa: E402
 from interpose.training.deconvolution import quicken  # noqa: E402
 from interpose.training.export import export_onnx  # noqa: E402

@@ -95,9 +95,13 @@ def test_what_somebody_says_stands(cmu_walk):
     ("roles", "words"),
     [
         ({"Hip": "Hips"}, "Did you mean Hips"),
-        ({"Hips": "Pelvis"}, "unknown joint: Pelvis"),
+        ({"Hips": "Pelvis"}, "Hips cannot be Pelvis"),
         ({"LeftArm": "Hips", "RightArm": "Hips"}, "Hips twice"),
-        ({"root": "nobody"}, "unknown joint: nobody"),
+        ({"Hips": "LeftFoot"}, "does not hang below LeftFoot"),
+        ({"LeftUpLeg": "RightUpLeg"}, "does not hang below RightUpLeg"),
+        ({"LeftUpLeg": "LeftFoot", "LeftFoot": "LeftUpLeg"}, "cannot be"),
+        ({"root": "LeftUpLeg", "Head": "Head"}, "does not hang below LeftUpLeg"),
+        ({"root": "nobody"}, "no joint nobody"),
     ],
 )
 def test_what_somebody_says_wrongly_is_said(cmu_walk, roles, words):
@@ -116,6 +120,68 @@ def test_several_characters_in_one_file(cmu_walk):
     chosen = find_mapping(replace(both, roles={"root": "B:Hips"}))
     assert {both.names[joint][:2] for joint in chosen.mapped[1]} == {"B:"}
     assert len(chosen.mapped[0]) == 22
+
+
+@pytest.mark.parametrize(
+    ("own", "odd", "role"),
+    [
+        ("LeftArm", "LeftOberarm", "LeftArm"),
+        ("RightUpLeg", "RightHaunch", "RightUpLeg"),
+        ("LeftForeArm", "LeftElbo", "LeftForeArm"),
+        ("RightLeg", "RightKnie", "RightLeg"),
+        ("RightFoot", "RFt", "RightFoot"),
+        ("Spine1", "Thing", "Spine2"),
+    ],
+)
+def test_one_odd_name_is_found_by_its_place(cmu_walk, own, odd, role):
+    skeleton = replace(
+        cmu_walk.skeleton, names=tuple(odd if n == own else n for n in cmu_walk.skeleton.names)
+    )
+    mapping, plain = find_mapping(skeleton), find_mapping(cmu_walk.skeleton)
+    assert mapping.joints == plain.joints
+    assert mapping.how[JOINTS.index(role)] == "chain"
+
+
+def test_names_of_another_language_are_found_by_shape_with_the_whole_trunk(cmu_walk):
+    mapping = find_mapping(renamed(cmu_walk.skeleton, "gelenk"))
+    plain = find_mapping(cmu_walk.skeleton)
+    odd = [n for n, a, b in zip(JOINTS, mapping.joints, plain.joints) if a != b]
+    assert not odd
+
+
+def _with(skeleton: Skeleton, at: str, name: str, bones: list) -> Skeleton:
+    """A chain of joints hung from a joint."""
+    names, parents, offsets = list(skeleton.names), list(skeleton.parents), list(skeleton.rest_translation)
+    above = skeleton.index(at)
+    for number, bone in enumerate(bones):
+        names.append(f"{name}{number}")
+        parents.append(above)
+        offsets.append(np.array(bone))
+        above = len(names) - 1
+    return Skeleton(tuple(names), tuple(parents), np.array(offsets))
+
+
+def test_capes_and_swords_do_not_confuse(cmu_walk):
+    dressed = _with(cmu_walk.skeleton, "Spine1", "cape", [[0, -0.2, -0.1]] * 6)
+    armed = _with(dressed, "RightHand", "sword", [[0, 0.1, 0.4]] * 3)
+    assert find_mapping(renamed(armed)).joints == find_mapping(cmu_walk.skeleton).joints
+    assert find_mapping(armed).joints == find_mapping(cmu_walk.skeleton).joints
+
+
+def test_names_are_read_character_by_character(cmu_walk):
+    """Prefixes are those of a character, not of the file, which may hold props first."""
+    one = cmu_walk.skeleton
+    names = (*(f"prop{j}" for j in range(13)), *(f"Bob_{n}" for n in one.names))
+    parents = (-1, *range(12), *(p + 13 if p >= 0 else -1 for p in one.parents))
+    both = Skeleton(names, parents, np.concatenate([np.full((13, 3), 0.1), one.rest_translation]))
+    mapping = find_mapping(both)
+    assert mapping.sure > 0.9
+    assert both.names[mapping["LeftHand"]] == "Bob_LeftHand"
+
+
+def test_bones_without_length_are_no_body(cmu_walk):
+    flat = replace(cmu_walk.skeleton, rest_translation=np.zeros((31, 3)))
+    assert not find_mapping(flat).usable
 
 
 def test_a_map_file_says_what_was_found_and_is_read_back(cmu_walk, tmp_path):

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from interpose.geometry.ground import turn, wrap
+from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS
 from interpose.skeletons.body import PAIRS, facing
 
@@ -106,32 +107,6 @@ def to_image(positions: Tensor, observed: Tensor) -> Image:
         dim=2,
     )
     return Image(rows.transpose(1, 2), known.transpose(1, 2), floor, root, yaw, placed)
-
-
-def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
-    """For each frame the last frame at or before it, and the first at or after it, that is placed.
-
-    (B, T) booleans to two (B, T) of indices. At an open end both name the only neighbour there is; where
-    nothing is placed at all, frame 0.
-    """
-    length = placed.shape[1]
-    frame = torch.arange(length, device=placed.device).expand_as(placed)
-    rank = torch.cumsum(placed.long(), dim=1)
-    count = rank[:, -1:]
-    # The k-th placed frame stands in slot k; slot 0 takes all others and is never asked for.
-    table = torch.zeros(placed.shape[0], length + 1, dtype=torch.long, device=placed.device)
-    table = table.scatter(1, torch.where(placed, rank, 0), frame)
-    last = table.gather(1, torch.minimum(torch.clamp(rank, min=1), count))
-    first = table.gather(1, torch.minimum(torch.where(placed, rank, rank + 1), count))
-    nothing = count == 0
-    return torch.where(nothing, 0, last), torch.where(nothing, 0, first)
-
-
-def pick(values: Tensor, index: Tensor) -> Tensor:
-    """Values (B, T) or (B, T, n) at frames (B, T)."""
-    if values.ndim == 3:
-        index = index[..., None].expand(-1, -1, values.shape[2])
-    return values.gather(1, index)
 
 
 # Frames over which a wrong turning rate, and a wrong speed of a joint, at a gap's edge are taken to fade.

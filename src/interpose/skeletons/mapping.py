@@ -11,7 +11,7 @@ import numpy as np
 from interpose.clip import Skeleton
 from interpose.errors import RequestError, unknown
 from interpose.skeletons import names
-from interpose.skeletons.canonical import BONES, JOINTS, LEG_LENGTH
+from interpose.skeletons.canonical import BONES, JOINTS, LEG_LENGTH, PARENTS
 from interpose.skeletons.topology import guess
 
 HOW = ("given", "name", "chain", "shape")
@@ -56,7 +56,8 @@ class Mapping:
     def lacking(self) -> tuple[str, ...]:
         """Those of them without which it is no humanoid: nothing can stand in for them."""
         head = () if self["Head"] is not None or self["Neck"] is not None else ("Head",)
-        return (*(name for name in self.missing if name in ESSENTIAL), *head)
+        gone = (*(name for name in self.missing if name in ESSENTIAL), *head)
+        return gone or (() if self.leg_length > 1e-6 else ("legs that have a length",))
 
     @property
     def usable(self) -> bool:
@@ -137,7 +138,9 @@ class Mapping:
             while joint not in (top, -1):
                 total += 0.5 * lengths[joint]
                 joint = self.skeleton.parents[joint]
-        return total
+            if joint < 0:
+                return float("nan")
+        return float(total)
 
     @property
     def scale(self) -> float:
@@ -157,19 +160,33 @@ def find_mapping(skeleton: Skeleton) -> Mapping:
     """
     given = _given(skeleton)
     root = skeleton.roles.get("root")
+    if root is not None and root not in skeleton.names:
+        error = unknown("joint", root, skeleton.names)
+        raise RequestError(f"there is no joint {root} to be the root", error.why, error.fix)
     roots = [skeleton.index(root)] if root is not None else list(skeleton.roots)
-    found = [_find(skeleton, _below(skeleton, root), given) for root in roots]
-    return max(found, key=lambda mapping: (mapping.usable, len(mapping.mapped[0])))
+    inside = [_below(skeleton, one) for one in roots]
+    for name, joint in given.items():
+        if joint is not None and root is not None and joint not in inside[0]:
+            raise RequestError(
+                f"{name} cannot be {skeleton.names[joint]}",
+                f"it does not hang below {root}, which is said to be the root",
+                "Name a joint of that character, or another root.",
+            )
+    found = [_find(skeleton, some, given) for some in inside]
+    return _check(max(found, key=lambda mapping: (mapping.usable, len(mapping.mapped[0]))))
 
 
 def _given(skeleton: Skeleton) -> dict[str, int | None]:
     """What somebody said: canonical joint to own joint, None for one that is not there."""
     given: dict[str, int | None] = {}
     for name, own in skeleton.roles.items():
-        if name == "root":
+        if name in ("root", "hand"):
             continue
         if name not in JOINTS:
             raise unknown("canonical joint", name, JOINTS)
+        if own and own not in skeleton.names:
+            error = unknown("joint", own, skeleton.names)
+            raise RequestError(f"{name} cannot be {own}: there is no such joint", error.why, error.fix)
         given[name] = skeleton.index(own) if own else None
     used = [joint for joint in given.values() if joint is not None]
     if twice := {skeleton.names[joint] for joint in used if used.count(joint) > 1}:
@@ -192,28 +209,54 @@ def _below(skeleton: Skeleton, root: int) -> list[int]:
 
 def _find(skeleton: Skeleton, inside: list[int], given: dict[str, int | None]) -> Mapping:
     """The mapping of the joints `inside`."""
-    said = names.read(skeleton.names)
-    chains = _Chains(skeleton, {joint: said[joint] for joint in inside})
-    found = chains.find()
-    how = dict.fromkeys(found, "name")
+    here = {name: joint for name, joint in given.items() if joint is None or joint in inside}
+    said = dict(zip(inside, names.read(tuple(skeleton.names[joint] for joint in inside))))
+    chains = _Chains(skeleton, said)
+    found, how = chains.limbs()
     if not {"LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm"} <= set(found) and (
         shaped := guess(skeleton, inside)
     ):
         found, how = shaped, dict.fromkeys(shaped, "shape")
-    found |= {name: joint for name, joint in given.items() if joint is not None}
-    if any(name in given for name in ESSENTIAL) or "Hips" not in found:
-        found = {**chains.trunk(found), **found}
-    for name in TRUNK:
-        if name in found and how.get(name) != "shape":
-            how[name] = "name" if said[found[name]].part in ("hips", "spine", "neck", "head") else "chain"
-    for name, joint in given.items():
+    fixed = {name: joint for name, joint in here.items() if joint is not None}
+    # What is given is nothing else as well.
+    found = {name: joint for name, joint in found.items() if joint not in fixed.values()} | fixed
+    for name, joint in chains.trunk(found).items():
+        if name not in found:
+            found[name] = joint
+            how[name] = "name" if said[joint].part in ("hips", "spine", "neck", "head") else "chain"
+    for name, own in here.items():
         how[name] = "given"
-        if joint is None:
+        if own is None:
             found.pop(name, None)
     joints = tuple(found.get(name) for name in JOINTS)
-    return Mapping(
-        skeleton, joints, tuple(how[name] if found.get(name) is not None else "" for name in JOINTS)
-    )
+    how_each = tuple(how.get(name, "chain") if found.get(name) is not None else "" for name in JOINTS)
+    return Mapping(skeleton, joints, how_each)
+
+
+def _check(mapping: Mapping) -> Mapping:
+    """The mapping, if it makes a body: RequestError where what somebody said hangs from the wrong place."""
+    skeleton = mapping.skeleton
+    for row, joint in enumerate(mapping.joints):
+        above = PARENTS[row]
+        while above >= 0 and mapping.joints[above] is None:
+            above = PARENTS[above]
+        if joint is None or above < 0 or mapping.joints[above] in skeleton.ancestors(joint):
+            continue
+        names_ = skeleton.names[joint], skeleton.names[mapping.joints[above]]  # type: ignore[index]
+        if "given" in (mapping.how[row], mapping.how[above]):
+            raise RequestError(
+                f"{JOINTS[row]} cannot be {names_[0]}",
+                f"it does not hang below {names_[1]}, which is {JOINTS[above]}",
+                "Correct the map; interpose skeleton prints the tree.",
+            )
+        fewer = tuple(None if j == row else own for j, own in enumerate(mapping.joints))
+        how = tuple("" if j == row else one for j, one in enumerate(mapping.how))
+        return _check(Mapping(skeleton, fewer, how))
+    return mapping
+
+
+Found = dict[str, int]
+LEG, ARM = ("UpLeg", "Leg", "Foot", "Toe"), ("Shoulder", "Arm", "ForeArm", "Hand")
 
 
 class _Chains:
@@ -221,34 +264,80 @@ class _Chains:
 
     def __init__(self, skeleton: Skeleton, said: dict[int, names.Said]) -> None:
         self.skeleton, self.said = skeleton, said
+        self.above = {joint: skeleton.ancestors(joint) for joint in said}
 
-    def find(self) -> dict[str, int]:
-        """Canonical names to joints."""
-        found: dict[str, int] = {}
-        for side, name in ((-1, "Left"), (1, "Right")):
-            found |= {name + part: joint for part, joint in (self._leg(side) | self._arm(side)).items()}
-        return found | self.trunk(found)
+    def limbs(self) -> tuple[Found, dict[str, str]]:
+        """Legs and arms by their names; what one side's names leave open follows from the other side, or from
+        its neighbours. And how each joint was found."""
+        sides = {name: self._leg(side) | self._arm(side) for side, name in ((-1, "Left"), (1, "Right"))}
+        how = {side + part: "name" for side, found in sides.items() for part in found}
+        for parts in (LEG, ARM):
+            for side, other in (("Left", "Right"), ("Right", "Left")):
+                guessed = self._like(sides[side], sides[other], parts)
+                guessed |= {
+                    p: j for p, j in self._beside(sides[side] | guessed, parts).items() if p not in guessed
+                }
+                for part, joint in guessed.items():
+                    if sides[side].get(part) != joint:
+                        sides[side][part], how[side + part] = joint, "chain"
+        return {side + part: joint for side, found in sides.items() for part, joint in found.items()}, how
+
+    def _like(self, mine: Found, other: Found, parts: tuple[str, ...]) -> Found:
+        """The joints of a limb as far above its end as on the other side, if that is more complete."""
+        ends = [part for part in parts[::-1] if part in mine and part in other]
+        whole = sum(part in other for part in parts), sum(part in mine for part in parts)
+        named = [self.said[joint].part for part, joint in mine.items() if part in parts]
+        if not ends or whole[0] < whole[1] or (whole[0] == whole[1] and not {"shoulder", "hip"} & set(named)):
+            return {}
+        found, end = {}, ends[0]
+        for part in parts[: parts.index(end)]:
+            if part in other and other[part] in self.above[other[end]]:
+                steps = self.above[other[end]].index(other[part])
+                if steps < len(self.above[mine[end]]) and self.above[mine[end]][steps] in self.said:
+                    found[part] = self.above[mine[end]][steps]
+        return found
+
+    def _beside(self, mine: Found, parts: tuple[str, ...]) -> Found:
+        """An unnamed joint between two named ones, or right below or above a named one."""
+        top, middle, end = ("UpLeg", "Leg", "Foot") if parts is LEG else ("Arm", "ForeArm", "Hand")
+        found: Found = {}
+        if middle not in mine and top in mine and end in mine:
+            chain = self.between(mine[top], mine[end])[:-1]
+            way = np.cumsum(np.linalg.norm(self.skeleton.rest_translation[[*chain, mine[end]]], axis=1))
+            if chain:
+                found[middle] = chain[int(np.argmax(np.minimum(way[:-1], way[-1] - way[:-1])))]
+        if top not in mine and middle in mine and self.above[mine[middle]][:1]:
+            above = self.above[mine[middle]][0]
+            if above in self.said and self.said[above].part in (None, "leg"):
+                found[top] = above
+        if end not in mine and middle in mine:
+            below = [j for j, up in self.above.items() if up[:1] == (mine[middle],)]
+            below = [j for j in below if any(j in up for up in self.above.values())] or below
+            if parts is LEG and len(below) == 1:
+                found[end] = below[0]
+        return found
 
     def _first(self, parts: str, side: int, below: int | None = None) -> int | None:
         """The topmost joint that is one of these parts of a side, below a joint."""
         for joint, said in self.said.items():
-            under = below is None or below in self.skeleton.ancestors(joint)
+            under = below is None or below in self.above[joint]
             if said.side == side and said.part in parts.split() and under:
                 return joint
         return None
 
-    def _leg(self, side: int) -> dict[str, int]:
+    def _leg(self, side: int) -> Found:
         # A "hip" of one side is the thigh where nothing else is called so; the last, after a "hip joint".
         thigh, leg = self._first("thigh", side), self._first("leg", side)
         hips = [joint for joint, said in self.said.items() if said.side == side and said.part == "hip"]
         thigh = hips[-1] if thigh is None and hips else thigh
         shin = self._first("shin leg", side, thigh) if thigh is not None else self._first("shin", side, leg)
         thigh = leg if thigh is None and shin is not None else thigh
-        foot = self._first("ankle foot", side, shin) if shin is not None else None
-        toe = self._first("foot toe", side, foot) if foot is not None else None
+        top = shin if shin is not None else thigh
+        foot = self._first("ankle foot", side, top) if top is not None else None
+        toe = self._first("foot toe", side, foot) if foot is not None else self._first("toe", side, top)
         return _only({"UpLeg": thigh, "Leg": shin, "Foot": foot, "Toe": toe})
 
-    def _arm(self, side: int) -> dict[str, int]:
+    def _arm(self, side: int) -> Found:
         clavicle, shoulder = self._first("clavicle", side), self._first("shoulder", side)
         arm = self._first("upperarm", side, clavicle if clavicle is not None else shoulder)
         if arm is None:
@@ -257,11 +346,13 @@ class _Chains:
             arm = self._first("upperarm", side) if arm is None else arm
         if clavicle is None and shoulder != arm:
             clavicle = shoulder
-        elbow = self._first("forearm", side, arm) if arm is not None else None
-        hand = self._first("hand", side, elbow) if elbow is not None else None
+        top = arm if arm is not None else clavicle
+        elbow = self._first("forearm", side, top) if top is not None else self._first("forearm", side)
+        top = elbow if elbow is not None else top
+        hand = self._first("hand", side, top) if top is not None else None
         return _only({"Shoulder": clavicle, "Arm": arm, "ForeArm": elbow, "Hand": hand})
 
-    def trunk(self, limbs: dict[str, int]) -> dict[str, int]:
+    def trunk(self, limbs: Found) -> Found:
         """Hips, spine, neck and head, from where legs and arms branch off."""
         legs = [limbs[name] for name in ("LeftUpLeg", "RightUpLeg") if name in limbs]
         arms = [limbs.get(side + "Shoulder", limbs.get(side + "Arm")) for side in ("Left", "Right")]
@@ -279,7 +370,7 @@ class _Chains:
         if self.said[chest].part == "neck":
             chest = self.skeleton.parents[chest]  # Bipeds hang their collar bones off the neck
         found: dict[str, int | None] = {"Hips": hips}
-        spine = self._between(hips, chest)
+        spine = self.between(hips, chest)
         if spine:
             found["Spine"] = spine[0]
             found["Spine1"] = spine[len(spine) // 2] if len(spine) > 2 else None
@@ -287,24 +378,23 @@ class _Chains:
         up = self._upwards(chest, tops)
         head = limbs.get("Head", next((j for j in up if self.said[j].part == "head"), up[-1] if up else None))
         found["Head"] = head
-        found["Neck"] = self._neck(self._between(chest, head)[:-1]) if head is not None else None
+        necks = self.between(chest, head)[:-1] if head is not None and chest in self.above[head] else []
+        found["Neck"] = self._neck(necks)
         return _only(found)
 
     def _upwards(self, chest: int, arms: list[int]) -> list[int]:
         """The joints of neck and head, in order: those that are called so, or else the middle branch that is
         longest (Rigify calls them spine, too)."""
-        named = [
-            j for j, said in self.said.items() if said.part == "head" and chest in self.skeleton.ancestors(j)
-        ]
+        named = [j for j, said in self.said.items() if said.part == "head" and chest in self.above[j]]
         if named:
-            return self._between(chest, named[0])
-        aside = {a for arm in arms for a in (arm, *self.skeleton.ancestors(arm))}
+            return self.between(chest, named[0])
+        aside = {a for arm in arms for a in (arm, *self.above[arm])}
         best: list[int] = []
         for joint, said in self.said.items():
-            chain = self._between(chest, joint)
-            plain = all(self.said[j].part in ("spine", "neck") and j not in aside for j in chain)
-            if said.part and plain and len(chain) > len(best):
-                best = chain
+            if said.part in ("spine", "neck") and len(self.above[joint]) > len(self.above[chest]) + len(best):
+                chain = self.between(chest, joint)
+                if all(self.said[j].part in ("spine", "neck") and j not in aside for j in chain):
+                    best = chain
         return best
 
     def _pelvis(self, meeting: int) -> int:
@@ -325,19 +415,13 @@ class _Chains:
     def _meet(self, joints: Iterable[int]) -> int | None:
         """The lowest joint above all of these."""
         first, *others = joints
-        return next(
-            (
-                a
-                for a in self.skeleton.ancestors(first)
-                if all(a in self.skeleton.ancestors(b) for b in others)
-            ),
-            None,
-        )
+        return next((a for a in self.above[first] if all(a in self.above[b] for b in others)), None)
 
-    def _between(self, top: int, end: int) -> list[int]:
-        """The joints from below `top` down to `end`, with it."""
-        chain = [j for j in (end, *self.skeleton.ancestors(end)) if top in self.skeleton.ancestors(j)]
-        return chain[::-1]
+    def between(self, top: int, end: int) -> list[int]:
+        """The joints from below `top` down to `end`, with it; none if `end` is not below."""
+        if top not in self.above[end]:
+            return []
+        return [end, *self.above[end][: self.above[end].index(top)]][::-1]
 
 
 def _only(found: dict[str, int | None]) -> dict[str, int]:

@@ -107,7 +107,7 @@ def _say(cut: list[str]) -> Said:
     extra = EXTRAS & set(kept)
     if not side and plain not in MEANING:
         side, plain = _glued(plain)
-    if extra and not (plain == "necktwist" or plain in MEANING):
+    if extra and plain not in MEANING:
         return Said(None, side)
     part = MEANING.get(plain)
     if plain == "l" or (side and part in ("spine", "neck", "head", "hips") and plain not in ("hip",)):

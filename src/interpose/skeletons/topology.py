@@ -13,8 +13,9 @@ import numpy as np
 from interpose.clip import Skeleton
 from interpose.geometry import kinematics
 
-# How much the two sides may differ in length, and how long a limb is at least: shares of the longest reach.
-LIKE, LIMB = 0.08, 0.25
+# How much bones of the two sides may differ, as a share of them: real people's do. How long a limb is at
+# least, as a share of the longest reach.
+LIKE, LIMB = 0.20, 0.25
 FOOT = 0.08  # of the leg: a shorter segment after the ankle is no foot
 
 
@@ -65,19 +66,23 @@ class _Shape:
         some = sorted(
             (c for c in self.children[joint] if self.whole(c) > least), key=self.whole, reverse=True
         )
-        for a, b in zip(some, some[1:]):
-            limbs = [limb for limb in (self.limb(a), self.limb(b)) if limb]
-            if self.whole(a) - self.whole(b) <= LIKE * self.whole(a) and len(limbs) == 2:
-                return limbs
-        return []
+        pairs = [(self.chain(a), self.chain(b)) for i, a in enumerate(some) for b in some[i + 1 :]]
+        best = max(pairs, key=lambda pair: self._alike(*pair), default=None)
+        if best is None or (same := int(self._alike(*best)[0])) < 2:
+            return []
+        # As far as they are alike: what a hand holds does not count.
+        return [self._limb(chain[: same + 1]) for chain in best]
 
-    def limb(self, start: int) -> _Limb | None:
-        chain = self.chain(start)
-        if len(chain) < 3:
-            return None
+    def _alike(self, a: list[int], b: list[int]) -> tuple[float, float]:
+        """How many bones two chains have in common from their start on, and how alike these are."""
+        off = [abs(x - y) / max(x, y, 1e-9) for x, y in zip(self.length[a[1:]], self.length[b[1:]])]
+        same = next((i for i, one in enumerate(off) if one > LIKE), len(off))
+        return same, -float(np.sum(off[:same]))
+
+    def _limb(self, chain: list[int]) -> _Limb:
         sums = np.array([self.length[b] + self.length[c] for b, c in zip(chain[1:], chain[2:])])
         # The last that are nearly the longest: some collar bones are as long as forearms.
-        return _Limb(chain, int(np.flatnonzero(sums > 0.9 * sums.max(initial=0.0))[-1]) if sums.any() else 0)
+        return _Limb(chain, int(np.flatnonzero(sums >= 0.9 * sums.max())[-1]))
 
 
 def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
@@ -93,7 +98,11 @@ def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
         up = shape.placed[chest] - shape.placed[hips]
         down = np.mean([shape.placed[leg.end] for leg in legs], axis=0) - shape.placed[hips]
         if np.linalg.norm(up) > 1e-6 and up @ down < -0.5 * np.linalg.norm(up) * np.linalg.norm(down):
-            return {"Hips": hips, **_limbs(shape, legs, shape.pair(chest), up), **_head(shape, chest)}
+            return {
+                "Hips": hips,
+                **_limbs(shape, legs, shape.pair(chest), up),
+                **_head(shape, chest, up, legs),
+            }
     return {}
 
 
@@ -122,11 +131,18 @@ def _limbs(shape: _Shape, legs: list[_Limb], arms: list[_Limb], up: np.ndarray) 
     return found
 
 
-def _head(shape: _Shape, chest: int) -> dict[str, int]:
-    """Neck and head: the longest branch at the chest that is no arm."""
+def _head(shape: _Shape, chest: int, up: np.ndarray, legs: list[_Limb]) -> dict[str, int]:
+    """Neck and head: the branch at the chest that is no arm and goes up furthest.
+
+    The head carries a face, or is the last joint; in rigs whose toes end in a joint of their own, the last
+    but one.
+    """
     arms = [arm.chain[0] for arm in shape.pair(chest)]
-    others = [joint for joint in shape.children[chest] if joint not in arms]
+    others = [shape.chain(joint) for joint in shape.children[chest] if joint not in arms]
     if not others:
         return {}
-    neck, *head = shape.chain(max(others, key=shape.whole))
-    return {"Neck": neck, "Head": head[0]} if head else {"Head": neck}
+    chain = max(others, key=lambda chain: float(shape.placed[chain[-1]] @ up))
+    face = next((i for i, joint in enumerate(chain) if len(shape.children[joint]) > 1), None)
+    tips = all(len(leg.chain) > leg.at + 4 for leg in legs) and len(chain) > 2
+    last = face if face is not None else len(chain) - (2 if tips else 1)
+    return {"Head": chain[last]}

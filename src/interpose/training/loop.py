@@ -93,6 +93,9 @@ class Trainer:
         model: what is trained.
         loss: from a random generator and the fraction of the budget spent to a scalar loss.
         validate: measures the averaged model; its figures go to the log.
+        optimizer: makes the optimiser from the parameters; Adam without one.
+        clip: the largest norm of the gradients.
+        about: what else the card should say of the model; kept with the settings.
     """
 
     def __init__(
@@ -104,11 +107,15 @@ class Trainer:
         budget: Budget,
         settings: Settings,
         say: Callable[[str], None] = print,
+        optimizer: Callable[[list[nn.Parameter]], torch.optim.Optimizer] | None = None,
+        clip: float | None = None,
+        about: dict[str, Any] | None = None,
     ) -> None:
         self.model, self.loss, self.validate = model, loss, validate
         self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
         self.device = next(model.parameters()).device
-        self.optimizer = torch.optim.Adam(model.parameters(), settings.learning_rate)
+        make = optimizer or (lambda some: torch.optim.Adam(some, settings.learning_rate))
+        self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
         self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
         # Every process draws batches of its own.
         self.rng = np.random.default_rng([settings.seed, rank()])
@@ -173,7 +180,12 @@ class Trainer:
     def run(self) -> nn.Module:
         """Train until the budget is spent; the averaged model comes back."""
         if rank() == 0:
-            kept = {**asdict(self.settings), "budget": str(self.budget), "processes": processes()}
+            kept = {
+                **asdict(self.settings),
+                **self.about,
+                "budget": str(self.budget),
+                "processes": processes(),
+            }
             kept["commit"] = commit()
             (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
         self.budget.start(gpu=self.device.type == "cuda")
@@ -185,6 +197,8 @@ class Trainer:
             self.optimizer.zero_grad(set_to_none=True)
             loss.backward()
             self.budget.step(self._share())
+            if self.clip is not None:
+                nn.utils.clip_grad_norm_(self.model.parameters(), self.clip)
             self.optimizer.step()
             losses.append(loss.detach())
             with torch.no_grad():

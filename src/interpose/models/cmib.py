@@ -1,0 +1,149 @@
+"""Conditional motion in-betweening (CMIB), Kim et al. 2022: key poses and an action label to a whole motion.
+
+`Encoder` is the paper's network; `Cmib` puts around it what belongs to the method: the frame of the first
+key, interpolation between keys as its input, and constant bones at its output. It is what ONNX holds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn
+from interpose.models.keys import neighbours, pick
+from interpose.skeletons import JOINTS, PARENTS
+from interpose.skeletons.body import facing
+
+WIDTH = 7 * len(JOINTS)  # a position and a quaternion of each of the 22 joints: 154
+
+
+@dataclass(frozen=True)
+class CmibConfig:
+    """Section 4.5 of the paper, but for `longest`: one table of positions for all lengths.
+
+    Attributes:
+        labels: action labels; the first is "", for motions without one.
+        longest: frames, keys included.
+    """
+
+    labels: tuple[str, ...] = ("",)
+    heads: int = 7
+    layers: int = 8
+    inner: int = 2048
+    dropout: float = 0.05
+    longest: int = 160
+
+
+class Encoder(nn.Module):
+    """A transformer encoder over frames, the label's token in front (section 4.2, equations 4 to 10, 14)."""
+
+    def __init__(self, config: CmibConfig) -> None:
+        super().__init__()
+        self.label = nn.Embedding(len(config.labels), WIDTH)
+        self.place = nn.Parameter(0.02 * torch.randn(config.longest, WIDTH))
+        layer = nn.TransformerEncoderLayer(
+            WIDTH, config.heads, config.inner, config.dropout, activation="gelu", batch_first=True
+        )
+        self.layers = nn.TransformerEncoder(layer, config.layers, enable_nested_tensor=False)
+        self.last = nn.Linear(WIDTH, WIDTH)
+
+    def forward(self, frames: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, T, 154) and labels (B,) to the token (B, 154) and the frames (B, T, 154)."""
+        token = self.label(label)[:, None]
+        out = self.last(self.layers(torch.cat([token, frames + self.place[: frames.shape[1]]], dim=1)))
+        return out[:, 0], out[:, 1:]
+
+
+def between_keys(values: Tensor, keys: Tensor) -> Tensor:
+    """Values (B, T, J, n) of key frames (B, T), in between by LERP (n = 3) or SLERP (n = 4): equations 2, 3.
+
+    Before the first key and after the last one stands that key.
+    """
+    last, first = neighbours(keys)
+    flat = values.flatten(2)
+    a, b = (pick(flat, index).unflatten(2, values.shape[2:]) for index in (last, first))
+    frame = torch.arange(values.shape[1], device=values.device)
+    length = (first - last).clamp(min=1)
+    share = ((frame - last).clamp(min=0) / length).clamp(max=1.0)[..., None]
+    if values.shape[-1] == 4:
+        return rotations.slerp(a, b, share)
+    return a + share[..., None] * (b - a)
+
+
+def restore_bones(positions: Tensor, bones: Tensor) -> Tensor:
+    """Positions (B, T, 22, 3) with bones brought to their lengths (B, 22), hips first (section 4.2)."""
+    done = [positions[..., 0, :]]
+    for joint, parent in enumerate(PARENTS[1:], 1):
+        way = positions[..., joint, :] - positions[..., parent, :]
+        length = bones[:, joint, None, None] / way.norm(dim=-1, keepdim=True).clamp(min=1e-6)
+        done.append(done[parent] + way * length)
+    return torch.stack(done, dim=-2)
+
+
+class Cmib(nn.Module):
+    """Key poses in, a complete motion out.
+
+    Positions are metres of a body scaled to the canonical leg, rotations are canonical (global, relative to
+    the T-pose). Frames that are no keys may hold anything finite; they have no influence.
+    """
+
+    def __init__(self, config: CmibConfig | None = None) -> None:
+        super().__init__()
+        self.config = config or CmibConfig()
+        self.encoder = Encoder(self.config)
+
+    def prepare(self, positions: Tensor, rotation: Tensor, keys: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        """Interpolated frames (B, T, 154) seen from the keys, and the frame: its origin (B, 3) and yaw (B,).
+
+        The first key faces X, as in LAFAN1's protocol; the origin is halfway between first and last key.
+        """
+        positions = torch.where(keys[..., None, None], positions, 0.0)
+        rotation = torch.where(keys[..., None, None], rotation, rotation.new_tensor([1.0, 0, 0, 0]))
+        frame = torch.arange(keys.shape[1], device=keys.device).expand_as(keys)
+        start = torch.where(keys, frame, keys.shape[1]).amin(dim=1, keepdim=True)
+        target = torch.where(keys, frame, -1).amax(dim=1, keepdim=True)
+        start, target = start.clamp(max=keys.shape[1] - 1), target.clamp(min=0)
+        hips = positions[:, :, 0]
+        origin = 0.5 * (pick(hips, start) + pick(hips, target))[:, 0] * positions.new_tensor([1.0, 0, 1.0])
+        first = pick(positions.flatten(2), start).unflatten(2, (len(JOINTS), 3))[:, 0]
+        yaw = facing(first) - torch.pi / 2
+        positions = turn(positions - origin[:, None, None], -yaw[:, None, None])
+        rotation = rotations.multiply(rotations.about("Y", -yaw)[:, None, None], rotation)
+        # Of the two quaternions of the first key the one with a positive real part; the others follow it.
+        rotation = self._follow(rotation, pick(rotation.flatten(2), start).unflatten(2, (len(JOINTS), 4)))
+        frames = torch.cat(
+            [between_keys(positions, keys).flatten(2), between_keys(rotation, keys).flatten(2)], dim=2
+        )
+        return frames, origin, yaw
+
+    @staticmethod
+    def _follow(rotation: Tensor, first: Tensor) -> Tensor:
+        first = torch.where(first[..., :1] < 0, -first, first)
+        return torch.where((rotation * first).sum(-1, keepdim=True) < 0, -rotation, rotation)
+
+    def forward(
+        self, positions: Tensor, rotation: Tensor, keys: Tensor, label: Tensor, bones: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Complete a motion.
+
+        Args:
+            positions: (B, T, 22, 3).
+            rotation: (B, T, 22, 4).
+            keys: (B, T) booleans, the frames whose poses are known: at least the first and the last.
+            label: (B,) index into the configuration's labels.
+            bones: (B, 22) lengths of bones in metres.
+
+        Returns:
+            Positions (B, T, 22, 3) with bones restored, and rotations (B, T, 22, 4).
+        """
+        frames, origin, yaw = self.prepare(positions, rotation, keys)
+        _, out = self.encoder(frames, label)
+        count = 3 * len(JOINTS)
+        placed = restore_bones(out[..., :count].unflatten(2, (len(JOINTS), 3)), bones)
+        turned = rotations.normalize(out[..., count:].unflatten(2, (len(JOINTS), 4)))
+        placed = turn(placed, yaw[:, None, None]) + origin[:, None, None]
+        turned = rotations.multiply(rotations.about("Y", yaw)[:, None, None], turned)
+        return placed, turned

@@ -1,0 +1,177 @@
+"""The recipe of CMIB (Kim et al. 2022, sections 4.3 to 4.5), for one model of all lengths at 30 fps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+
+from interpose.datasets import Pack
+from interpose.geometry import rotations
+from interpose.methods.weights import Card
+from interpose.models.cmib import Cmib, CmibConfig
+from interpose.skeletons import JOINTS
+from interpose.training.budget import Budget
+from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.poses import Batch, Poses, labels_of, new_path
+
+POSITIONS = 3 * len(JOINTS)
+
+
+@dataclass
+class CmibSettings(Settings):
+    """The paper's recipe where it says one; a small budget wants a higher learning rate than its .0001."""
+
+    learning_rate: float = 4e-4
+    batch: int = 32  # of all processes together
+    shortest: int = 7  # frames, keys included
+    longest: int = 131
+    anchors: int = 3  # at most, besides start and target; the paper uses one and allows several
+    anchored: float = 0.5  # share of the batches that have any
+    augmented: float = 0.5  # share of walks and runs that take another way
+    labelled: float = 0.8  # share of the samples that see their label; the paper: all
+    semantic: float = 1.5
+    position: float = 0.05
+    rotation: float = 2.0
+    decay: float = 0.01
+    betas: tuple[float, float] = (0.9, 0.99)
+
+
+def draw_keys(rng: np.random.Generator, settings: CmibSettings, batch: int, length: int) -> np.ndarray:
+    """Key frames (B, T): the ends, and in some batches the same few anchors for all (randomised shuffled)."""
+    keys = np.zeros((batch, length), bool)
+    keys[:, [0, -1]] = True
+    if length > 2 and rng.random() < settings.anchored:
+        count = min(int(rng.integers(1, settings.anchors + 1)), length - 2)
+        keys[:, 1 + rng.choice(length - 2, count, replace=False)] = True
+    return keys
+
+
+@dataclass
+class Scales:
+    """What brings the three losses to about the same size before training starts (section 4.4)."""
+
+    semantic: float
+    position: float
+    rotation: float
+
+
+class Losses:
+    """Equations 15 to 18, in the frame of the first key."""
+
+    def __init__(self, model: Cmib, settings: CmibSettings) -> None:
+        self.model, self.settings = model, settings
+        self.scales: Scales | None = None
+
+    def parts(self, batch: Batch, keys: Tensor) -> tuple[Tensor, Tensor, Tensor]:
+        positions = batch.positions()
+        frames, _, _ = self.model.prepare(positions, batch.rotation, keys)
+        truth, _, _ = self.model.prepare(positions, batch.rotation, torch.ones_like(keys))
+        # The truth in the frame of the keys: its origin is that of the ends, which are keys, too. Its signs
+        # go on from the first key's.
+        turned = rotations.continuous(truth[..., POSITIONS:].unflatten(2, (len(JOINTS), 4)).transpose(0, 1))
+        truth_turned = turned.transpose(0, 1).flatten(2)
+        with torch.autocast(frames.device.type, torch.bfloat16):
+            token, out = self.model.encoder(frames, batch.label)
+        out, label = out.float(), self.model.encoder.label(batch.label)
+        return (
+            (token.float() - label).abs().mean(),
+            (out[..., :POSITIONS] - truth[..., :POSITIONS]).abs().mean(),
+            (out[..., POSITIONS:] - truth_turned).abs().mean(),
+        )
+
+    def __call__(self, batch: Batch, keys: Tensor) -> Tensor:
+        parts = self.parts(batch, keys)
+        if self.scales is None:
+            self.scales = Scales(*(1.0 / max(float(part.detach()), 1e-6) for part in parts))
+        weights = (self.settings.semantic, self.settings.position, self.settings.rotation)
+        scales = (self.scales.semantic, self.scales.position, self.scales.rotation)
+        return torch.stack([w * s * part for w, s, part in zip(weights, scales, parts)]).sum()
+
+
+def train_cmib(
+    packs: Sequence[Pack],
+    folder: Path,
+    budget: Budget,
+    settings: CmibSettings | None = None,
+    splits: Sequence[str] = ("train",),
+    start: Card | None = None,
+    say: Callable[[str], None] = print,
+) -> Cmib:
+    """Train, or go on training, in `folder`; the averaged model comes back. Arguments as in `train_cae`."""
+    settings = settings or CmibSettings()
+    if start:
+        settings = replace(settings, learning_rate=0.5 * settings.learning_rate)
+    device = pick_device()
+    torch.manual_seed(settings.seed)
+    labels = labels_of(packs, splits)
+    poses = Poses(packs, splits, labels, settings.longest, device)
+    held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
+    model = Cmib(CmibConfig(labels)).to(device)
+    if start:
+        restore(model, start.onnx)
+    losses = Losses(model, settings)
+    moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)
+    batch = max(1, settings.batch // processes())
+
+    def loss(rng: np.random.Generator, fraction: float) -> Tensor:
+        length = int(rng.integers(settings.shortest, settings.longest + 1))
+        drawn = poses.draw(rng, batch, length)
+        walks = moving[drawn.label].cpu().numpy() & (rng.random(batch) < settings.augmented)
+        drawn = new_path(rng, drawn, walks)
+        unsaid = torch.from_numpy(rng.random(batch) >= settings.labelled).to(device)
+        drawn.label = torch.where(unsaid, 0, drawn.label)
+        keys = torch.from_numpy(draw_keys(rng, settings, batch, length)).to(device)
+        return losses(drawn, keys)
+
+    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
+        return torch.optim.AdamW(
+            parameters, settings.learning_rate, settings.betas, weight_decay=settings.decay
+        )
+
+    trainer = Trainer(
+        model,
+        loss,
+        lambda averaged: validate(averaged, held_out),
+        folder,
+        budget,
+        settings,
+        say,
+        optimizer=optimizer,
+        clip=1.0,
+        about={"config": asdict(model.config)},
+    )
+    if start:
+        trainer.follow(start)
+    say(f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}")
+    if trainer.resume():
+        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
+    return trainer.run()
+
+
+@torch.no_grad()
+def validate(model: nn.Module, batch: Batch) -> dict[str, float]:
+    """Mean joint error (cm) and global rotation error (degrees) between two keys, and the ratio to
+    interpolation; and how far the embeddings of labels are apart, which tells whether they collapse."""
+    assert isinstance(model, Cmib)
+    figures: dict[str, float] = {}
+    positions, bones = batch.positions(), batch.bones.norm(dim=-1)
+    for length in (30, 60, 120):
+        part = slice(0, length)
+        keys = torch.zeros(len(positions), length, dtype=torch.bool, device=positions.device)
+        keys[:, [0, -1]] = True
+        placed, turned = model(positions[:, part], batch.rotation[:, part], keys, batch.label, bones)
+        share = torch.linspace(0, 1, length, device=positions.device)[:, None, None]
+        line = positions[:, :1] + share * (positions[:, length - 1 : length] - positions[:, :1])
+        off, base = ((p - positions[:, part])[:, 1:-1].norm(dim=-1).mean() for p in (placed, line))
+        figures[f"gap{length}"] = 100 * float(off)
+        figures[f"ratio{length}"] = float(off / base)
+        angle = rotations.angle(turned, batch.rotation[:, part])[:, 1:-1].mean()
+        figures[f"degrees{length}"] = float(torch.rad2deg(angle))
+    table = model.encoder.label.weight
+    figures["labels_apart"] = float(torch.cdist(table, table).mean() / table.norm(dim=1).mean())
+    return figures

@@ -1,0 +1,171 @@
+"""Random windows of whole poses, positions and rotations, with labels; and new paths for them.
+
+The Gaussian random path is that of Kim et al. 2022, section 4.3.2: a way over the floor between the same two
+points, sampled from a Gaussian process, along which the body is turned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from torch import Tensor
+
+from interpose.datasets import Pack
+from interpose.datasets.pack import STEP
+from interpose.errors import RequestError
+from interpose.geometry import kinematics, rotations
+from interpose.geometry.ground import turn
+from interpose.skeletons import PARENTS, SIDES
+
+
+@dataclass
+class Batch:
+    """Windows of a body scaled to the canonical leg.
+
+    Attributes:
+        rotation: (B, T, 22, 4) canonical rotations, continuous in time.
+        root: (B, T, 3) metres, the hips.
+        bones: (B, 22, 3) metres, in the T-pose.
+        label: (B,) index into the labels of the recipe.
+    """
+
+    rotation: Tensor
+    root: Tensor
+    bones: Tensor
+    label: Tensor
+
+    def positions(self) -> Tensor:
+        """(B, T, 22, 3) metres."""
+        move = self.bones[:, None].expand(*self.rotation.shape[:-1], 3)
+        above = torch.arange(len(PARENTS), device=move.device)[:, None] == 0
+        move = torch.where(above, self.root[:, :, None], move)
+        return kinematics.forward(kinematics.local_rotations(self.rotation, PARENTS), move, PARENTS)[1]
+
+
+def labels_of(packs: Sequence[Pack], splits: Sequence[str]) -> tuple[str, ...]:
+    """All labels of the clips of some splits, sorted; "" first, for motions without one."""
+    found = {str(x) for pack in packs for x, s in zip(pack.labels, pack.splits) if s in splits}
+    return ("", *sorted(found - {""}))
+
+
+class Poses:
+    """All clips of some splits that are long enough, in memory."""
+
+    def __init__(
+        self,
+        packs: Sequence[Pack],
+        splits: Sequence[str],
+        labels: Sequence[str],
+        longest: int,
+        device: torch.device,
+    ) -> None:
+        turned, root, bones, label, counts = [], [], [], [], []
+        for pack in packs:
+            for clip in range(len(pack.names)):
+                part = slice(pack.starts[clip], pack.starts[clip + 1])
+                if pack.splits[clip] in splits and part.stop - part.start >= longest:
+                    turned.append(pack.rotation[part])
+                    root.append(pack.root[part])
+                    bones.append(pack.bones[clip])
+                    label.append(labels.index(name) if (name := str(pack.labels[clip])) in labels else 0)
+                    counts.append(part.stop - part.start)
+        if not counts:
+            raise RequestError(
+                "there is nothing to train on",
+                f"the packs hold no clip of {', '.join(splits)} with {longest} frames or more",
+                "Make packs with: interpose data pack.",
+            )
+        self.device, self.counts = device, np.array(counts)
+        self.starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+        self.turned = torch.from_numpy(np.concatenate(turned)).to(device)
+        self.root = torch.from_numpy(np.concatenate(root)).to(device)
+        self.bones = torch.from_numpy(np.array(bones, np.float32)).to(device)
+        self.label = torch.tensor(label, device=device)
+        self.sides = torch.tensor(SIDES, device=device)
+
+    @property
+    def frames(self) -> int:
+        return int(self.counts.sum())
+
+    def at(self, clip: np.ndarray, first: np.ndarray, length: int) -> Batch:
+        """Windows of the given clips from the given frames on."""
+        index = torch.from_numpy((self.starts[clip] + first)[:, None] + np.arange(length)).to(self.device)
+        turned = rotations.exp(self.turned[index].to(torch.float32) * STEP)
+        # Rotation vectors jump where they pass half a turn; the rotations that they mean do not.
+        turned = rotations.continuous(turned.transpose(0, 1)).transpose(0, 1)
+        chosen = torch.from_numpy(clip).to(self.device)
+        return Batch(turned, self.root[index], self.bones[chosen], self.label[chosen])
+
+    def draw(self, rng: np.random.Generator, batch: int, length: int) -> Batch:
+        """A random batch, half of it mirrored left to right."""
+        weight = np.maximum(self.counts - length + 1, 0)
+        clip = rng.choice(len(weight), batch, p=weight / weight.sum())
+        drawn = self.at(clip, (rng.random(batch) * weight[clip]).astype(int), length)
+        flip = torch.from_numpy(rng.random(batch) < 0.5).to(self.device)[:, None, None]
+        mirrored = drawn.rotation[:, :, self.sides] * drawn.rotation.new_tensor([1.0, 1, -1, -1])
+        side = drawn.root.new_tensor([-1.0, 1, 1])
+        return Batch(
+            torch.where(flip[..., None], mirrored, drawn.rotation),
+            torch.where(flip, drawn.root * side, drawn.root),
+            torch.where(flip, drawn.bones[:, self.sides] * side, drawn.bones),
+            drawn.label,
+        )
+
+    def spread(self, count: int, length: int) -> Batch:
+        """A fixed set of windows spread evenly over all clips, for validation."""
+        whole = [(c, f) for c, n in enumerate(self.counts) for f in range(0, n - length + 1, length)]
+        chosen = np.array(whole)[np.linspace(0, len(whole) - 1, min(count, len(whole))).astype(int)]
+        return self.at(chosen[:, 0], chosen[:, 1], length)
+
+
+def random_path(
+    rng: np.random.Generator, x: np.ndarray, y: np.ndarray, sigma: float = 0.0, jitter: float = 1e-6
+) -> np.ndarray | None:
+    """A new `y` (T,) over the same `x` (T,), in metres, with the same two ends; None if x is not monotonic.
+
+    From the Gaussian process with the squared exponential kernel, conditioned on the ends (equations 11-13).
+
+    Args:
+        x: the way along the line between the ends; it must grow.
+        y: the way across it.
+        sigma: how loosely the ends are met.
+        jitter: added to the diagonal, so that Cholesky's decomposition exists.
+    """
+    if not (np.diff(x) > 0).all():
+        return None
+    ends = np.array([0, len(x) - 1])
+
+    def kernel(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.exp(-0.5 * (a[:, None] - b) ** 2)
+
+    cross = kernel(x, x[ends])
+    gain = np.linalg.solve(kernel(x[ends], x[ends]) + (sigma**2 + jitter) * np.eye(2), cross.T).T
+    covariance = kernel(x, x) - gain @ cross.T
+    root = np.linalg.cholesky(covariance + jitter * np.eye(len(x)))
+    path = gain @ y[ends] + root @ rng.standard_normal(len(x))
+    # What jitter leaves open at the ends (a millimetre) is spread along the path.
+    miss = y[ends] - path[ends]
+    share = (x - x[0]) / (x[-1] - x[0])
+    return path + (1 - share) * miss[0] + share * miss[1]
+
+
+def new_path(rng: np.random.Generator, batch: Batch, which: np.ndarray) -> Batch:
+    """The windows `which` (B,) walk another way between the same two points, turned along it."""
+    rotation, root = batch.rotation.clone(), batch.root.clone()
+    for i in np.flatnonzero(which):
+        way = batch.root[i].cpu().numpy().astype(float)
+        line = way[-1] - way[0]
+        yaw = np.arctan2(line[0], line[2])
+        flat = turn(way, np.array(-yaw))  # the line lies along Z now
+        across = random_path(rng, flat[:, 2], flat[:, 0])
+        if across is None:
+            continue
+        headings = [np.arctan2(np.gradient(a), np.gradient(flat[:, 2])) for a in (flat[:, 0], across)]
+        change = torch.from_numpy(headings[1] - headings[0]).to(root)
+        there = turn(np.stack([across, flat[:, 1], flat[:, 2]], axis=-1), np.array(yaw))
+        root[i] = torch.from_numpy(there).to(root)
+        rotation[i] = rotations.multiply(rotations.about("Y", change)[:, None], batch.rotation[i])
+    return Batch(rotation, root, batch.bones, batch.label)
