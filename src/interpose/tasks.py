@@ -21,6 +21,7 @@ from interpose.geometry import rotations
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation
+from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
@@ -74,6 +75,7 @@ def fill(
             "no value of the clip is observed, so any motion would do",
             "Leave at least one frame out of the gaps.",
         )
+    whole, clip = clip, _handed(clip, observation)
     jobs = plan(clip, observation, method, max_gap, only, methods or {})
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
@@ -100,8 +102,18 @@ def fill(
     left = [job.gap for job in jobs if job.method is None]
     report = Report(method, reports, left)
     return Completion(
-        clip.with_motion(rotation, translation), lambda: _put_together(clip, said), provenance, report
+        whole.with_motion(rotation, translation), lambda: _put_together(whole, said), provenance, report
     )
+
+
+def _handed(clip: Clip, observation: Observation) -> Clip:
+    """The clip with its handedness said, from all that is observed of it: single gaps must not decide."""
+    frames = observation.frames
+    if "hand" in clip.skeleton.roles or not frames.any():
+        return clip
+    body = find_humanoid(clip.with_motion(clip.rotation[frames], clip.translation[frames]))
+    roles = {**clip.skeleton.roles, "hand": "left" if body.left_handed else "right"}
+    return replace(clip, skeleton=replace(clip.skeleton, roles=roles))
 
 
 def recover(

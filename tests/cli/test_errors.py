@@ -43,7 +43,7 @@ def three_lines(err: str) -> list[str]:
         (["--gap", "60:80", "-o", "no/such/out.bvh"], "no/such"),
         (["--gap", "60:80", "-o", "out"], ".bvh"),
         (["--gap", "60:80", "--unit", "furlong"], "inch"),
-        (["--gap", "60:80", "--up", "x"], "up axis"),
+        (["--gap", "60:80", "--up", "w"], "up axis"),
         (["--gap", "60:80", "--gab", "1"], "Did you mean --gap"),
         (["--gap"], "--gap"),
         (["--gap", "60:80", "other.bvh"], "other.bvh"),

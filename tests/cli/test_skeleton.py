@@ -39,8 +39,10 @@ def test_the_tree_says_what_every_joint_is(run, rig):
     assert rows["thigh_l"][0] == "LeftUpLeg"
     assert rows["spine_01"][0] == "Spine"
     assert rows["upperarm_twist_01_r"][1:] == ["carried", "along"]
-    assert "a humanoid: 22 of the 22" in done.out
-    assert "its zero pose is none, T-pose from the motion" in done.out
+    assert "a humanoid, 22 of 22 joints found by names" in done.out
+    assert "the T-pose was worked out from the motion" in done.out
+    assert rows["root"][1:] == ["above", "it"]
+    assert rows["ik_hand_gun"][1:] == ["not", "part", "of", "this", "body"]
 
 
 def test_json_for_programs(run, rig):
@@ -48,7 +50,8 @@ def test_json_for_programs(run, rig):
     assert found["humanoid"] is True
     assert found["mapping"]["LeftHand"] == "hand_l"
     assert "ik_hand_gun" in found["carried_along"]
-    assert found["rest_pose"] == "none"
+    assert found["zero_pose"] == "none"
+    assert found["t_pose_from"] == "motion"
     assert found["missing"] == []
 
 
@@ -60,7 +63,7 @@ def test_a_saved_map_is_corrected_and_obeyed(run, rig, tmp_path):
     (tmp_path / "hero.map.json").write_text(json.dumps(content))
     found = run("skeleton", rig, "--map", "hero.map.json", "--json").json
     assert found["missing"] == ["LeftToe"]
-    assert found["sure"] == 1
+    assert found["how"]["LeftArm"] == "given"
     again = run("skeleton", rig, "--save-map", "hero.map.json")
     assert again.code == 2
     assert "exists already" in again.err
@@ -94,7 +97,7 @@ def test_a_picture_of_the_t_pose(run, rig, tmp_path):
     ("options", "code", "says"),
     [
         (["--map", "no.json"], 3, "cannot read the map"),
-        (["--root", "nobody"], 2, "unknown joint: nobody"),
+        (["--root", "nobody"], 2, "no joint nobody"),
         (["--rest-frame", "9999"], 2, "no frame 9999"),
     ],
 )
@@ -103,3 +106,34 @@ def test_bad_options(run, rig, options, code, says):
     assert done.code == code
     assert says in done.err
     assert len(done.err.strip().splitlines()) == 3
+
+
+def test_the_input_and_other_files_are_never_replaced(run, rig, tmp_path):
+    before = rig.read_bytes()
+    (tmp_path / "labels.json").write_text('{"content": "walk"}')
+    (tmp_path / "copy.json").symlink_to(rig)
+    for options in (
+        ("--save-map", rig),
+        ("--picture", rig),
+        ("--save-map", "labels.json"),
+        ("--save-map", "copy.json"),
+        ("--picture", "pose.png"),
+        ("--save-map", "no/such/map.json"),
+    ):
+        done = run("skeleton", rig, *options, "--force")
+        assert done.code == 2, options
+        assert len(done.err.strip().splitlines()) == 3
+    assert rig.read_bytes() == before
+    assert (tmp_path / "labels.json").read_text() == '{"content": "walk"}'
+
+
+def test_what_is_no_humanoid_writes_no_picture_and_no_map(run, strange, tmp_path):
+    done = run("skeleton", strange, "--save-map", "m.json", "--picture", "p.svg")
+    assert done.code == 2
+    assert "no T-pose to draw" in done.err
+    assert not (tmp_path / "m.json").exists()
+
+
+def test_fill_says_how_the_skeleton_is_understood(run, rig, strange):
+    assert "a humanoid, 22 of 22 joints found by names" in run("fill", rig, "--gap", "60:90").out
+    assert "skeleton: no humanoid" in run("fill", strange, "--gap", "60:90").out

@@ -121,7 +121,7 @@ def test_unit_given_or_unknowable(tmp_path, make_bvh, body):
         with pytest.raises(RequestError):
             formats.load(path, unit=wrong)
     with pytest.raises(RequestError):
-        formats.load(path, up="x")
+        formats.load(path, up="w")
     path.write_text(make_bvh([("a", 0, (0, 0, 0), "xyzZXY"), ("b", 1, (0, 170, 0), "ZXY")], np.zeros((2, 9))))
     assert formats.load(path).source.unit == 0.01  # something as long as a body
     path.write_text(make_bvh([("a", 0, (0, 0, 0), "xyzZXY"), ("b", 1, (0, 1e5, 0), "ZXY")], np.zeros((2, 9))))
@@ -143,6 +143,26 @@ def test_z_up(tmp_path, make_bvh, body):
     head, foot = clip.skeleton.index("Head"), clip.skeleton.index("LeftFoot")
     assert (clip.positions()[:, head, 1] > clip.positions()[:, foot, 1] + 0.8).all()
     assert clip.skeleton.rest_translation[head, 1] == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize(
+    ("up", "file"),
+    [("x", [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), ("-y", [[1, 0, 0], [0, -1, 0], [0, 0, -1]])],
+)
+def test_other_axes_up(tmp_path, make_bvh, body, up, file):
+    """A body that stands along X, or on its head: read upright, whole and unharmed."""
+    turn = np.array(file, float)  # from the clip's axes to the file's
+    lying = [(n, d, tuple(turn @ np.array(o)), c) for n, d, o, c in body]
+    path = tmp_path / "body.bvh"
+    path.write_text(make_bvh(lying, numbers(np.random.default_rng(4), 5, 30, 25)))
+    clip = formats.load(path)
+    assert clip.source.up == up
+    head, foot = clip.skeleton.index("Head"), clip.skeleton.index("LeftFoot")
+    assert (clip.positions()[:, head, 1] > clip.positions()[:, foot, 1] + 0.8).all()
+    untouched = formats.load(path, up="y").positions()
+    np.testing.assert_allclose(clip.positions(), untouched @ turn, atol=1e-9)
+    formats.save(clip, tmp_path / "again.bvh")
+    assert (tmp_path / "again.bvh").read_bytes() == path.read_bytes()
 
 
 def six(body, rng, replaces, frames=20):

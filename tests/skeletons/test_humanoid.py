@@ -185,3 +185,58 @@ def test_a_left_handed_take_is_filled_as_its_mirror_image(walk):
     one, other = (tasks.fill(c, [Gap(60, 90)], "cae") for c in (clip, reflect(clip)))
     assert other.report.gaps[0].method == "cae"
     assert np.abs(reflect(other.clip).positions() - one.clip.positions()).max() < 0.01
+
+
+def test_a_rest_frame_of_a_left_handed_take(walk):
+    """The frame is looked at in the mirror, too."""
+    clip, _ = rigs.build("smpl", walk)
+    still = np.tile([1.0, 0, 0, 0], (1, 22, 1))
+    pose = find_humanoid(clip).to_clip(still, np.array([[0, 1.0, 0]]), clip.slice(0, 1))
+    longer = clip.with_motion(
+        np.concatenate([pose.rotation, clip.rotation]), np.concatenate([pose.translation, clip.translation])
+    )
+    body = find_humanoid(reflect(longer), frame=0)
+    assert body.left_handed
+    assert degrees(body.rotations(reflect(longer))[0], still[0]).max() < 1
+
+
+def test_frames_of_walking_are_no_rest_poses(walk):
+    mapping = find_mapping(walk.skeleton)
+
+    def fits(frame: int) -> bool:
+        try:
+            find_rest(mapping, walk, frame)
+        except RequestError:
+            return False
+        return True
+
+    assert np.mean([fits(frame) for frame in range(0, len(walk), 5)]) < 0.1
+
+
+def test_lost_legs_neither_mirror_nor_sink_the_body(walk):
+    """What is not observed says nothing of handedness, and nothing of the floor."""
+    for joints in (("LeftLeg", "RightLeg"), ("LeftUpLeg", "RightUpLeg")):
+        done = tasks.recover(walk, joints, method="cae")
+        assert {gap.method for gap in done.report.gaps} == {"spline"}
+        assert "where the floor is" in " ".join(done.report.gaps[0].notes)
+    part = tasks.recover(walk, ("LeftLeg", "RightLeg"), (60, 120), method="cae")
+    assert {gap.method for gap in part.report.gaps} == {"cae"}
+    wrong = np.linalg.norm(part.clip.positions() - walk.positions(), axis=-1)
+    assert wrong[60:120].mean() < 0.05
+    one = tasks.recover(walk, ("LeftLeg",), method="cae")
+    assert np.linalg.norm(one.clip.positions() - walk.positions(), axis=-1).mean() < 0.05
+
+
+def test_a_still_says_nothing_of_handedness(walk):
+    still = walk.with_motion(walk.rotation[:1].copy(), walk.translation[:1])
+    still.rotation[:] = [1.0, 0, 0, 0]
+    assert not find_humanoid(still).left_handed
+    assert not find_humanoid(reflect(still)).left_handed
+    said = replace(still, skeleton=replace(still.skeleton, roles={"hand": "left"}))
+    assert find_humanoid(said).left_handed
+
+
+def test_what_is_no_humanoid_is_said(walk):
+    headless = replace(walk, skeleton=replace(walk.skeleton, roles={"Hips": "", "Spine": ""}))
+    with pytest.raises(RequestError, match="no humanoid"):
+        find_humanoid(headless).root(headless)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
@@ -25,7 +25,7 @@ class Reading:
     """How to read a file that leaves something open."""
 
     unit: Annotated[str | None, Parameter(help="m, cm, mm, inch, CMU, or metres per unit.")] = None
-    up: Annotated[str | None, Parameter(help="The axis that points up: y or z.")] = None
+    up: Annotated[str | None, Parameter(help="The axis that points up: y, z, x; --up=-y and so on.")] = None
     joint_positions: Annotated[
         str | None,
         Parameter(help="Position channels of joints replace their OFFSET, or add to it: replace or add."),
@@ -39,6 +39,10 @@ class Reading:
     map: Annotated[
         Path | None,
         Parameter(help="A JSON file that says which joint is which; `interpose skeleton` writes one."),
+    ] = None
+    handed: Annotated[
+        Literal["left", "right"] | None,
+        Parameter(help="Whether the file's axes are left- or right-handed."),
     ] = None
     root: Annotated[
         str | None, Parameter(help="The topmost joint of the character meant, where a file has several.")
@@ -55,6 +59,8 @@ class Reading:
         said = read_map(self.map) if self.map else dict(roles)
         if self.root is not None:
             said["root"] = self.root
+        if self.handed is not None:
+            said["hand"] = self.handed
         clip = load(path, self.unit, self.up, self.joint_positions, self.skeleton, self.file_fps, said)
         find_mapping(clip.skeleton)  # says what is wrong with the roles, before anything else is done
         return clip
@@ -69,7 +75,25 @@ def describe(path: Path, clip: Clip) -> list[str]:
     """What was read, and what was estimated, for a person."""
     size = f"{len(clip)} frames at {clip.fps:.4g} fps ({clip.seconds:.1f} s), {len(clip.skeleton)} joints"
     lines: tuple[str, ...] = clip.source.describe() if hasattr(clip.source, "describe") else ()
-    return [f"{path}: {size}", *(f"  {line}" for line in lines)]
+    return [f"{path}: {size}", *(f"  {line}" for line in (*lines, understood(clip)))]
+
+
+def understood(clip: Clip) -> str:
+    """How the skeleton is understood, in a line."""
+    from interpose.skeletons import find_humanoid
+
+    body = find_humanoid(clip)
+    if not body.mapping.usable:
+        return f"skeleton: no humanoid, nothing was found for {', '.join(body.mapping.lacking)}"
+    ways = {
+        "given": "as the map says",
+        "name": "by names",
+        "chain": "by names",
+        "shape": "by its shape: check it",
+    }
+    way = ways[body.mapping.surely]
+    hand = ", left-handed" if body.left_handed else ""
+    return f"skeleton: a humanoid, {len(body.mapping.mapped[0])} of 22 joints found {way}{hand}"
 
 
 def details(clip: Clip) -> dict[str, Any]:

@@ -11,11 +11,10 @@ from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
-    from interpose.skeletons import Humanoid
-    from interpose.skeletons.rest import Rest
+    from interpose.skeletons.humanoid import Humanoid
 
 HOW = {
-    "given": "as --map says",
+    "given": "as the map says",
     "name": "by its name",
     "chain": "by its place",
     "shape": "by the body's shape",
@@ -38,117 +37,148 @@ def skeleton(
     Try:
       interpose skeleton take.bvh
       interpose skeleton take.bvh --picture take.svg
-      interpose skeleton take.bvh --save-map take.map.json   (correct it, then add --map to any verb)
+      interpose skeleton take.bvh --save-map take.map.json
+
+    A saved map can be corrected by hand and given to any verb with --map.
 
     Ends with 0 when the skeleton is a humanoid, 4 when networks cannot use it.
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        save_map: write the mapping to a JSON file, to be corrected and given to --map.
-        picture: draw the T-pose that was found, from the front and beside the zero pose, as SVG.
-        rest_frame: the frame in which the body stands in a rest pose, if the zero pose is none.
+        save_map: write the mapping to a .json file, to be corrected and given to --map.
+        picture: draw the skeleton's zero pose and the T-pose that was found for it, as .svg.
+        rest_frame: look at the T-pose that a frame would give in which the body stands in a rest pose.
         json: print JSON for other programs.
-        force: replace existing files.
+        force: replace an earlier map or picture.
     """
     from interpose.cli.outputs import write_text
     from interpose.skeletons import find_humanoid
     from interpose.skeletons.mapfile import map_text
-    from interpose.skeletons.rest import find_rest
 
+    _check_free(file, save_map, picture, force)
     clip = reading.load(file)
-    body = find_humanoid(clip)
+    body = find_humanoid(clip, frame=rest_frame)
     mapping = body.mapping
-    if rest_frame is not None:
-        body = find_humanoid(clip, find_rest(mapping, clip, rest_frame))
-    rest = body.rest if mapping.usable else None
-    for path in (save_map, picture):
-        if path is not None and path.exists() and not force:
-            raise RequestError(
-                f"cannot write {path}", "the file exists already", "Choose another, or add --force."
-            )
-    if save_map is not None:
-        write_text(save_map, map_text(mapping))
-    if picture is not None:
-        write_text(picture, _picture(clip, body, file))
+    if picture is not None and not mapping.usable:
+        raise RequestError(
+            "there is no T-pose to draw",
+            f"the skeleton is no humanoid: nothing was found for {', '.join(mapping.lacking)}",
+            "Map it first: --save-map, then --map.",
+        )
+    drawn = _picture(body) if picture is not None else ""
     if json:
-        say_json({"input": str(file), **details(clip), **_details(body, rest)})
+        say_json({"input": str(file), **details(clip), **_details(body)})
     else:
-        _print(file, clip, body, rest)
-        for path in (save_map, picture):
-            if path is not None:
+        _print(file, clip, body)
+    for path, text in ((save_map, map_text(mapping)), (picture, drawn)):
+        if path is not None:
+            write_text(path, text)
+            if not json:
                 say(f"wrote {path}")
     return 0 if mapping.usable else 4
 
 
-def _details(body: Humanoid, rest: Rest | None) -> dict[str, Any]:
+def _check_free(file: Path, save_map: Path | None, picture: Path | None, force: bool) -> None:
+    """Before any work: RequestError if an output is the input, another kind of file, or in the way."""
+    from interpose.skeletons.mapfile import is_map
+
+    for path, suffix, option in ((save_map, ".json", "--save-map"), (picture, ".svg", "--picture")):
+        if path is None:
+            continue
+        what, other = f"cannot write {path}", f"Choose another name: {option} NAME{suffix}."
+        if path.suffix.lower() != suffix:
+            raise RequestError(what, f"{option} writes {suffix} files", other)
+        if path.is_dir():
+            raise RequestError(what, "it is a directory", other)
+        if not path.parent.is_dir():
+            raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
+        if not path.exists():
+            continue
+        if file.exists() and path.samefile(file):
+            raise RequestError(what, "it is the input, which stays as it is", other)
+        if suffix == ".json" and not is_map(path):
+            raise RequestError(what, "it is a file of another kind", f"{other} --force replaces maps only.")
+        if not force:
+            raise RequestError(what, "the file exists already", f"{other[:-1]}, or add --force.")
+
+
+def _details(body: Humanoid) -> dict[str, Any]:
     from interpose.skeletons import JOINTS
 
     mapping = body.mapping
-
+    rest = body.rest if mapping.usable else None
     own = [None if joint is None else mapping.skeleton.names[joint] for joint in mapping.joints]
-    used = set(own)
     return {
         "humanoid": mapping.usable,
-        "sure": mapping.sure,
         "mapping": dict(zip(JOINTS, own)),
         "how": {name: how for name, how in zip(JOINTS, mapping.how) if how},
         "missing": list(mapping.missing),
-        "carried_along": [name for name in mapping.skeleton.names if name not in used],
+        "lacking": list(mapping.lacking),
+        "carried_along": [name for name in mapping.skeleton.names if name not in own],
         "left_handed": body.left_handed,
         "leg": mapping.leg_length if mapping.usable else None,
-        "rest_pose": None if rest is None else rest.pose,
-        "rest_pose_how": None if rest is None else rest.how,
+        "zero_pose": rest.pose if rest else None,
+        "t_pose_from": rest.how if rest else None,
     }
 
 
-def _print(file: Path, clip: Clip, body: Humanoid, rest: Rest | None) -> None:
+def _print(file: Path, clip: Clip, body: Humanoid) -> None:
     from interpose.skeletons import JOINTS
 
     mapping = body.mapping
     say("\n".join(describe(file, clip)))
-    role = {joint: (name, how) for name, joint, how in zip(JOINTS, mapping.joints, mapping.how)}
-    count = len(mapping.mapped[0])
-    if rest is not None:
-        say(f"  a humanoid: {count} of the 22 joints that networks know, {100 * mapping.sure:.0f} % sure")
-        zero = "its zero pose is none" if rest.pose == "none" else f"its zero pose: {rest.pose}"
-        say(f"  leg {mapping.leg_length:.2f} m; {zero}, T-pose from the {rest.how}")
+    if mapping.usable:
+        say(f"  {_t_pose(body)}; leg {mapping.leg_length:.2f} m")
         if body.left_handed:
             say("  left-handed: its knees bend forward, so networks see it in a mirror")
     else:
-        lacking = ", ".join(mapping.lacking)
-        say(f"  no humanoid: nothing found for {lacking}")
-        say("  Networks cannot fill it, classical methods can. --save-map writes a map to correct.")
+        say("  Networks cannot fill it, classical methods can. --save-map writes a map to complete.")
+    of = {joint: (name, how) for name, joint, how in zip(JOINTS, mapping.joints, mapping.how)}
     skeleton, depth = mapping.skeleton, [0] * len(mapping.skeleton)
+    hips = mapping["Hips"]
     rows = []
     for joint, parent in enumerate(skeleton.parents):
         depth[joint] = depth[parent] + 1 if parent >= 0 else 0
-        name, how = role.get(joint, ("", ""))
-        rows.append(("  " * depth[joint] + skeleton.names[joint], name or "-", HOW.get(how, "carried along")))
+        name, how = of.get(joint, ("-", ""))
+        beside = hips is not None and hips not in (joint, *skeleton.ancestors(joint))
+        follows = "not part of this body" if beside else "carried along"
+        follows = "above it" if hips is not None and joint in skeleton.ancestors(hips) else follows
+        rows.append(("  " * depth[joint] + skeleton.names[joint], name, HOW.get(how, follows)))
     say()
     say_table(("joint", "is", ""), rows)
-    if mapping.missing and rest is not None:
+    if mapping.missing and mapping.usable:
         say()
         say(f"missing, so derived from the others: {', '.join(mapping.missing)}")
 
 
-def _picture(clip: Clip, body: Humanoid, file: Path) -> str:
-    """The T-pose (or without a humanoid the zero pose) and a frame of the motion, side by side."""
+def _t_pose(body: Humanoid) -> str:
+    """Where the T-pose comes from, in words."""
+    if body.rest.how == "motion":
+        return "its zero pose (all rotations 0) is no T- or A-pose: the T-pose was worked out from the motion"
+    if body.rest.how == "zero pose":
+        kinds = {"T": "a T-pose", "A": "an A-pose", "arms down": "a pose with arms down"}
+        return f"its zero pose is {kinds[body.rest.pose]}"
+    return f"T-pose from {body.rest.how}"
+
+
+def _picture(body: Humanoid) -> str:
+    """The zero pose, and the T-pose that was found, of the canonical joints."""
     import numpy as np
 
+    from interpose.geometry import kinematics
     from interpose.show import Take, strip
-    from interpose.skeletons import JOINTS, PARENTS
-    from interpose.skeletons.humanoid import canonical_positions
+    from interpose.skeletons import JOINTS, PARENTS, canonical_positions
 
-    if not body.mapping.usable:
-        raise RequestError(
-            "there is no T-pose to draw", "the skeleton is no humanoid", "Map it first: --save-map, --map."
-        )
-    turned = body.rotations(clip)
-    still = np.zeros_like(turned[:1])
-    still[..., 0] = 1.0
-    frames = np.linspace(0, len(clip) - 1, min(len(clip), 7)).astype(int)
-    poses = np.concatenate([still, turned[frames]])
-    root = np.concatenate([body.root(clip)[frames[:1]], body.root(clip)[frames]])
-    placed = canonical_positions(poses, root, body.bones)
-    take = Take(f"{file.name} as the canonical humanoid", placed, "#2463c8")
-    return strip([take], PARENTS, clip.fps, [], title="T-pose, and the motion", names=JOINTS)
+    skeleton = body.mapping.skeleton
+    bones = skeleton.rest_translation * skeleton.scale_above[:, None]
+    placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)[1]
+    zero = (body.mapping.weights @ placed * body.hand)[None]
+    for row, (joint, _) in body.mapping.levers.items():
+        zero[:, row] = placed[joint] * body.hand
+    still = np.tile([1.0, 0, 0, 0], (1, len(JOINTS), 1))
+    found = canonical_positions(still, zero[:, 0], body.bones)
+    takes = [
+        Take("zero pose: all rotations 0", zero - zero[:, :1], "#dd5f28"),
+        Take("the T-pose that was found", found - found[:, :1], "#2463c8"),
+    ]
+    return strip(takes, PARENTS, 30, [], title="How the skeleton is understood", names=JOINTS)

@@ -16,7 +16,7 @@ from interpose.datasets.catalogue import FPS, Entry, clips
 from interpose.errors import FileError
 from interpose.geometry import rotations
 from interpose.skeletons import JOINTS, canonical_positions, find_humanoid
-from interpose.skeletons.rest import Rest, find_rest
+from interpose.skeletons.rest import Rest
 
 STEP = np.pi / 32767  # radians: rotation vectors in 16 bits, to .003 degrees
 JUMP = 0.4  # metres a frame at 30 fps; no body moves at 12 m/s here, so the recording is broken.
@@ -141,4 +141,4 @@ def _rests(chosen: list[tuple[Entry, Clip]]) -> Iterator[tuple[str, Rest]]:
             rotation=np.concatenate([clip.rotation[::step] for clip in alike]),
             translation=np.concatenate([clip.translation[::step] for clip in alike]),
         )
-        yield performer, find_rest(find_humanoid(first).mapping, pool)
+        yield performer, find_humanoid(pool).rest

@@ -61,7 +61,8 @@ def legs(skeleton: Skeleton) -> tuple[Leg, ...]:
         if thigh is None or knee is None or ankle is None:
             continue
         chain = [joint for joint in (thigh, knee, ankle, toe) if joint is not None]
-        if all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:])):
+        bones = np.linalg.norm(skeleton.rest_translation[[knee, ankle]], axis=1)
+        if bones.min() > 1e-6 and all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:])):
             found.append(Leg(thigh, knee, ankle, toe))
     return tuple(found)
 

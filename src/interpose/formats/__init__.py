@@ -47,7 +47,7 @@ def load(
     Args:
         path: the file.
         unit: metres per unit of the file, or m, cm, mm, inch, CMU. Estimated when None.
-        up: the file's up axis, "y" or "z". Estimated when None.
+        up: the file's up axis: y, z, x, or -y, ... Estimated when None.
         joint_positions: "replace" or "add": what position channels do to a joint's rest translation.
             Estimated when None.
         skeleton: the .asf file that an .amc file belongs to. Found beside it when None.
@@ -63,6 +63,10 @@ def load(
     """
     path = Path(path)
     chosen = _format(path)
+    if roles is not None and not isinstance(roles, Mapping):
+        raise RequestError(
+            f"cannot use roles={roles!r}", "it is no mapping", 'Give for example roles={"Hips": "pelvis"}.'
+        )
     options: dict[str, Any] = {"unit": unit, "up": up, "joint_positions": joint_positions}
     options |= {"skeleton": skeleton, "fps": fps, "roles": roles or None}
     options = {name: value for name, value in options.items() if value is not None}

@@ -17,9 +17,17 @@ USUAL_LEG = 0.85
 BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
 SAMPLE = 51  # frames looked at for estimates
 
-# Where the axes X, Y, Z of a file stand in a clip, and their signs. A file with Z up is turned by -90 degrees
-# about X as a whole, rest pose included: exact in floating point, because it only moves numbers.
-_INSIDE = {"y": ((0, 1, 2), (1.0, 1.0, 1.0)), "z": ((0, 2, 1), (1.0, -1.0, 1.0))}
+# Where the axes X, Y, Z of a file stand in a clip, and their signs, by the axis that points up. A file with Z
+# up is turned by -90 degrees about X as a whole, rest pose included: exact in floating point, because that
+# only moves numbers.
+_INSIDE = {
+    "y": ((0, 1, 2), (1.0, 1.0, 1.0)),
+    "z": ((0, 2, 1), (1.0, -1.0, 1.0)),
+    "x": ((1, 0, 2), (1.0, -1.0, 1.0)),
+    "-x": ((1, 0, 2), (-1.0, 1.0, 1.0)),
+    "-y": ((0, 1, 2), (1.0, -1.0, -1.0)),
+    "-z": ((0, 2, 1), (1.0, 1.0, -1.0)),
+}
 
 
 def vectors_inside(vectors: np.ndarray, unit: float, up: str) -> np.ndarray:
@@ -77,9 +85,9 @@ def given_unit(unit: float | str | None) -> float | None:
 
 
 def given_up(up: str | None) -> str | None:
-    """ "y" or "z" from what the user gave."""
+    """ "y", "z", "-y", ... from what the user gave."""
     if up is not None and up.lower() not in _INSIDE:
-        raise unknown("up axis", up, ("y", "z"))
+        raise unknown("up axis", up, _INSIDE)
     return None if up is None else up.lower()
 
 
@@ -120,8 +128,8 @@ def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
     length = np.linalg.norm(body, axis=-1, keepdims=True)
     mean = np.mean(body / np.where(length > 0, length, 1.0), axis=0)
     # Someone who lies down for the whole clip says nothing; only a clear sign departs from the usual Y.
-    if mean[2] > 0.7 and abs(mean[1]) < mean[2]:
-        return "z", "estimated from the direction from feet to head"
-    if mean[1] > 0.5:
-        return "y", "estimated from the direction from feet to head"
+    most = int(np.argmax(np.abs(mean)))
+    if mean[1] > 0.5 or abs(mean[most]) > 0.7:
+        up = "y" if mean[1] > 0.5 else ("-" if mean[most] < 0 else "") + "xyz"[most]
+        return up, "estimated from the direction from feet to head"
     return "y", "assumed, the direction from feet to head is not clear"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -122,6 +123,8 @@ class Cae:
             return (
                 "no joint that the network knows hangs below these, so positions do not tell their rotation"
             )
+        if gap.joints is not None and len(gap) == len(clip) and self._floats(mapping, gap.joints):
+            return "both feet are lost all the time, so nothing tells it where the floor is"
         length = len(gap) * self.card.fps / clip.fps
         if gap.joints is None and length > self.card.max_gap:
             at = f"{length:.0f} frames at {self.card.fps:g} fps"
@@ -138,9 +141,17 @@ class Cae:
         }
         return bool(lost & below)
 
+    @staticmethod
+    def _floats(mapping: Mapping, names: tuple[str, ...]) -> bool:
+        """Whether all joints of the feet lie below one of these joints."""
+        skeleton = mapping.skeleton
+        lost = {skeleton.index(name) for name in names}
+        feet = [mapping[side + part] for side in ("Left", "Right") for part in ("Foot", "Toe")]
+        return all(lost & set(skeleton.ancestors(joint)) for joint in feet if joint is not None)
+
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Positions of the mapped joints at every frame, beside a spline for what positions cannot tell."""
-        card, body = self.card, find_humanoid(clip)
+        card, body = self.card, self._body(clip, observation)
         base = Spline().complete(clip, observation).clip
         known = body.observed(observation.positions(clip.skeleton), observation.rotation)
         positions = body.positions(clip) * body.scale
@@ -158,6 +169,15 @@ class Cae:
         rows, joints = body.mapping.mapped
         notes = {"model": card.name, "drift": drift}
         return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
+
+    @staticmethod
+    def _body(clip: Clip, observation: Observation) -> Humanoid:
+        """The humanoid, by what is observed of its motion; where no frame is whole, right-handed."""
+        whole = observation.frames
+        if whole.any():
+            return find_humanoid(clip.with_motion(clip.rotation[whole], clip.translation[whole]))
+        hand = {"hand": "right", **clip.skeleton.roles}
+        return find_humanoid(replace(clip, skeleton=replace(clip.skeleton, roles=hand)))
 
     def _drift(
         self,

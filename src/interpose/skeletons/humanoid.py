@@ -8,10 +8,13 @@ from functools import cached_property
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
 from interpose.skeletons.canonical import BONES, JOINTS, PARENTS
 from interpose.skeletons.mapping import Mapping, find_mapping
 from interpose.skeletons.rest import Rest, find_rest
+
+CLEAR = 0.04  # the sine of a bend of both knees together, in the mean: less tells nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,11 +31,13 @@ class Humanoid:
         clip: the clip; its motion is looked at for what the skeleton itself does not tell.
         mapping: usable.
         given: the T-pose, where it is known already; else it is found when it is needed.
+        frame: a frame of the clip that is a rest pose, where somebody says so.
     """
 
     clip: Clip
     mapping: Mapping
     given: Rest | None = None
+    frame: int | None = None
 
     @cached_property
     def rest(self) -> Rest:
@@ -40,17 +45,26 @@ class Humanoid:
         if self.given:
             return self.given
         clip = self._right(self.clip)
-        return find_rest(replace(self.mapping, skeleton=clip.skeleton), clip)
+        return find_rest(replace(self.mapping, skeleton=clip.skeleton), clip, self.frame)
 
     @cached_property
     def left_handed(self) -> bool:
-        """Whether the clip is its own mirror image: its knees bend forward, by where left and right are."""
-        return knees_bend_forward(self.mapping, self.clip)
+        """Whether the clip is its own mirror image: somebody says so, or its knees bend forward."""
+        said = self.mapping.skeleton.roles.get("hand")
+        return said == "left" if said else knees_bend_forward(self.mapping, self.clip)
 
     @property
     def hand(self) -> np.ndarray:
         """(3,) what positions of the clip are multiplied with to give right-handed ones, and back."""
         return np.array([-1.0 if self.left_handed else 1.0, 1.0, 1.0])
+
+    def _check(self) -> None:
+        if not self.mapping.usable:
+            raise RequestError(
+                "the skeleton is no humanoid",
+                f"nothing was found for {', '.join(self.mapping.lacking)}",
+                "Say which joints they are: load(..., roles=...), or --map.",
+            )
 
     def _right(self, clip: Clip) -> Clip:
         """A clip of this skeleton as a right-handed one."""
@@ -63,6 +77,7 @@ class Humanoid:
 
     def positions(self, clip: Clip) -> np.ndarray:
         """(F, 22, 3) canonical joints of a clip of this skeleton, in metres, unscaled."""
+        self._check()
         turned, placed = self._right(clip).kinematics()
         positions = np.einsum("cj,fjx->fcx", self.mapping.weights, placed)
         for row, (joint, bone) in self.mapping.levers.items():
@@ -80,6 +95,7 @@ class Humanoid:
 
     def rotations(self, clip: Clip) -> np.ndarray:
         """(F, 22, 4) canonical rotations of a clip; missing joints turn with their parents."""
+        self._check()
         turned = self._right(clip).kinematics()[0]
         rows, joints = self.mapping.mapped
         canonical = np.zeros((len(clip), len(JOINTS), 4))
@@ -93,6 +109,7 @@ class Humanoid:
 
     def root(self, clip: Clip) -> np.ndarray:
         """(F, 3) where the hips are, in metres, unscaled."""
+        self._check()
         joint = self.mapping["Hips"]
         assert joint is not None
         return clip.positions()[:, joint] * self.hand
@@ -175,7 +192,7 @@ def reflect(clip: Clip) -> Clip:
 
 
 def knees_bend_forward(mapping: Mapping, clip: Clip) -> bool:
-    """Whether knees bend the wrong way, as seen from left and right, in the mean over a clip."""
+    """Whether knees clearly bend the wrong way, as seen from left and right, in the mean over a clip."""
     if not mapping.usable or len(clip) == 0:
         return False
     step = max(1, len(clip) // 100)
@@ -186,7 +203,7 @@ def knees_bend_forward(mapping: Mapping, clip: Clip) -> bool:
         return rotations.normalize(points[:, JOINTS.index(end)] - points[:, JOINTS.index(start)])
 
     bends = [np.cross(way(s + "UpLeg", s + "Leg"), way(s + "Leg", s + "Foot")) for s in ("Left", "Right")]
-    return bool((sum(bends) * way("RightUpLeg", "LeftUpLeg")).sum(-1).mean() < 0)
+    return bool((sum(bends) * way("RightUpLeg", "LeftUpLeg")).sum(-1).mean() < -CLEAR)
 
 
 def canonical_positions(rotation: np.ndarray, root: np.ndarray, bones: np.ndarray) -> np.ndarray:
@@ -207,9 +224,13 @@ def canonical_positions(rotation: np.ndarray, root: np.ndarray, bones: np.ndarra
     )[1]
 
 
-def find_humanoid(clip: Clip, rest: Rest | None = None) -> Humanoid:
+def find_humanoid(clip: Clip, rest: Rest | None = None, frame: int | None = None) -> Humanoid:
     """The skeleton of a clip as a humanoid; look at `mapping` for how far it went.
 
-    rest: the T-pose, when more is known of it than this clip tells (from other clips, from a rest frame).
+    Args:
+        clip: its motion tells what the skeleton leaves open (handedness, the T-pose where the zero pose is
+            none), so all of it should be real.
+        rest: the T-pose, when more is known of it than this clip tells (from other clips of the same rig).
+        frame: a frame of the clip that is a rest pose.
     """
-    return Humanoid(clip, find_mapping(clip.skeleton), rest)
+    return Humanoid(clip, find_mapping(clip.skeleton), rest, frame)

@@ -3,7 +3,8 @@
 {"root": "Bip01", "joints": {"Hips": "Bip01 Pelvis", "LeftUpLeg": "Bip01 L Thigh", "LeftToe": ""}}
 
 "joints" names the skeleton's own joint for each canonical one; "" or null says that it has none; what is left
-out is found as ever. "root" may name the topmost joint of the character that is meant.
+out is found as ever. "root" may name the topmost joint of the character that is meant, "hand" say "left" or
+"right" of the file's axes.
 """
 
 from __future__ import annotations
@@ -38,10 +39,13 @@ def read_map(path: str | Path) -> dict[str, str]:
     if not isinstance(joints, dict):
         raise FileError(f"there is no mapping in {path}", 'it has no object "joints"', f"Write {EXAMPLE}")
     roles = {str(name): own for name, own in joints.items()}
-    if content.get("root") is not None:
-        roles["root"] = content["root"]
+    for key in ("root", "hand"):
+        if content.get(key) is not None:
+            roles[key] = content[key]
+    if roles.get("hand") not in (None, "left", "right"):
+        raise FileError(f"the map {path} is wrong", "a hand is left or right", 'Write {"hand": "left", ...}')
     for name, own in roles.items():
-        if name not in (*JOINTS, "root"):
+        if name not in (*JOINTS, "root", "hand"):
             raise unknown("canonical joint", name, JOINTS)
         if own is not None and not isinstance(own, str):
             raise FileError(f"the map {path} is wrong", f"{name} is {own!r}, not a name", f"Write {EXAMPLE}")
@@ -49,9 +53,17 @@ def read_map(path: str | Path) -> dict[str, str]:
 
 
 def map_text(mapping: Mapping) -> str:
-    """What such a file holds for a mapping, all canonical joints named."""
-    own = [mapping.skeleton.names[joint] if joint is not None else "" for joint in mapping.joints]
-    content: dict[str, object] = {"joints": dict(zip(JOINTS, own))}
-    if root := mapping.skeleton.roles.get("root"):
-        content = {"root": root, **content}
-    return json.dumps(content, indent=2) + "\n"
+    """What such a file holds for a mapping: the joints that were found."""
+    names, roles = mapping.skeleton.names, mapping.skeleton.roles
+    own = {name: names[joint] for name, joint in zip(JOINTS, mapping.joints) if joint is not None}
+    own |= {name: "" for name, said in roles.items() if said == ""}
+    content = {key: roles[key] for key in ("root", "hand") if roles.get(key)}
+    return json.dumps({**content, "joints": own}, indent=2) + "\n"
+
+
+def is_map(path: Path) -> bool:
+    """Whether a file is such a mapping."""
+    try:
+        return isinstance(json.loads(path.read_text(encoding="utf-8"))["joints"], dict)
+    except (OSError, ValueError, RecursionError, KeyError, TypeError):
+        return False

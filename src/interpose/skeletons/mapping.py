@@ -14,10 +14,9 @@ from interpose.skeletons import names
 from interpose.skeletons.canonical import BONES, JOINTS, LEG_LENGTH, PARENTS
 from interpose.skeletons.topology import guess
 
+# How a joint is found, the surest way first: somebody said so, its own name says so, its place among named
+# joints does, or the shape of the skeleton where no name helps.
 HOW = ("given", "name", "chain", "shape")
-# How sure a joint is: what somebody said, what its own name says, what its place between named joints says,
-# what the shape of the skeleton says where no name helps.
-SURE = {"given": 1.0, "name": 0.95, "chain": 0.9, "shape": 0.6}
 TRUNK = ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
 # Where the joints of the trunk lie along it, in metres of the canonical body.
 ALONG = np.cumsum([np.linalg.norm(BONES[JOINTS.index(name)]) for name in TRUNK])
@@ -65,11 +64,9 @@ class Mapping:
         return not self.lacking
 
     @property
-    def sure(self) -> float:
-        """How sure the mapping is as a whole, 0 to 1: as its least sure essential joint."""
-        if not self.usable:
-            return 0.0
-        return min(SURE[how] for name, how in zip(JOINTS, self.how) if name in ESSENTIAL)
+    def surely(self) -> str:
+        """How the least sure of the essential joints was found, one of HOW."""
+        return max((how for name, how in zip(JOINTS, self.how) if name in ESSENTIAL and how), key=HOW.index)
 
     @cached_property
     def mapped(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
@@ -150,7 +147,7 @@ class Mapping:
 
 @lru_cache(maxsize=64)
 def find_mapping(skeleton: Skeleton) -> Mapping:
-    """The mapping of a skeleton; look at `missing`, `usable` and `sure` for how far it went.
+    """The mapping of a skeleton; look at `missing`, `usable` and `how` for how far it went.
 
     What `skeleton.roles` says stands. Then names are read; a joint that they leave open may follow from those
     around it (the spine does), and where names say nothing the shape of the skeleton is asked. Where a file

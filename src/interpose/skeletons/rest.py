@@ -34,7 +34,9 @@ HINGES = {
     for side in ("Left", "Right")
     for a, b in (("UpLeg", "Leg"), ("Arm", "ForeArm"))
 }
-SHORT = 0.01  # metres: what a shorter bone points at means nothing
+# Cosines by which legs may be off the vertical and elbows bent in a zero pose, which somebody has modelled,
+# and in a frame, which may be any.
+LENIENT, STRICT = 0.8, 0.96
 # An estimated axis that is nearer to one of the joint's own than this is that one.
 AXIS = np.cos(np.radians(12.0))
 # In the T-pose elbows do not bend straight ahead but a little downwards: the axis of the left one. Measured
@@ -87,7 +89,7 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
                 "Name another one, or leave it out.",
             )
         turned, placed = (some[0] for some in clip.slice(frame, frame + 1).kinematics())
-        rest, pose = _from_pose(mapping, turned, placed), _kind(mapping, placed)
+        rest, pose = _from_pose(mapping, turned, placed), _kind(mapping, placed, STRICT)
         if pose == "none":
             raise RequestError(
                 f"frame {frame} is no rest pose",
@@ -128,8 +130,8 @@ def _basis(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return rotations.from_matrix(np.stack([x, y, np.cross(x, y)], axis=1))
 
 
-def _kind(mapping: Mapping, placed: np.ndarray) -> str:
-    """Whether a pose (J, 3) is a rest pose, and which."""
+def _kind(mapping: Mapping, placed: np.ndarray, least: float = LENIENT) -> str:
+    """Whether a pose (J, 3) is a rest pose, and which; `least` is the cosine by which limbs may be off."""
     if np.linalg.norm(np.ptp(placed, axis=0)) < 1e-6:
         return "none"
     points = rotations.rotate(_frame(mapping, placed), mapping.weights @ placed)
@@ -143,7 +145,7 @@ def _kind(mapping: Mapping, placed: np.ndarray) -> str:
         arms = [way(side + "Arm", side + "ForeArm")]
         if mapping[side + "Hand"] is not None:
             arms.append(way(side + "ForeArm", side + "Hand"))
-        if min(-leg[1] for leg in legs) < 0.8 or abs(arms[0] @ arms[-1]) < 0.7 or arms[0][1] > 0.4:
+        if min(-leg[1] for leg in legs) < least or arms[0] @ arms[-1] < least or arms[0][1] > 0.4:
             return "none"
         if arms[0][0] * sign < -0.2:
             return "none"

@@ -38,7 +38,7 @@ class Layout:
         gains: (T, K, 3) how the translations change with each of these.
         degrees: (C,) what a number is multiplied with to give degrees; 1 where it is no angle.
         unit: metres per file unit.
-        up: "y" or "z".
+        up: the axis that points up, "y", "z", ...
     """
 
     orders: tuple[str, ...]

@@ -29,7 +29,7 @@ class AmcSource:
         header: what stands above the first frame.
         motion: the frames' original text, with all that is above.
         skeleton: the skeleton as read.
-        layout: which number means what; its `unit` is metres per file unit, its `up` "y" or "z".
+        layout: which number means what; its `unit` is metres per file unit, its `up` the axis.
         fps: as read.
         asf_how, unit_how, up_how, fps_how: "given", or how it was found.
     """
@@ -52,7 +52,7 @@ class AmcSource:
 
     @property
     def up(self) -> str:
-        """The files' up axis, "y" or "z"."""
+        """The files' up axis, "y", "z", ..."""
         return self.layout.up
 
     def describe(self) -> tuple[str, ...]:
@@ -82,7 +82,7 @@ def read(
         unit: metres per file unit, or one of m, cm, mm, inch, CMU. When None it is an inch divided by the
             length unit in the skeleton's file, as Vicon writes it (CMU and HDM05: 0.45), where that gives
             plausible legs, and else estimated from them.
-        up: "y" or "z"; estimated from the motion when None.
+        up: the axis that points up, "y", "z", "x", "-y", ...; estimated from the motion when None.
         skeleton: the skeleton's file; found beside the motion when None, see `find_asf`.
         fps: frames a second; when None what the file says, which few do, else 120.
         roles: what is said about the joints, see `Skeleton`.

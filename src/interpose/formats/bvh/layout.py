@@ -22,7 +22,7 @@ class Layout:
         translation_columns: (K, 3) columns of x, y, z; -1 where there is no channel.
         base: (K, 3) file units: what is added to the channels.
         unit: metres per file unit.
-        up: "y" or "z".
+        up: the axis that points up, "y", "z", ...
     """
 
     orders: tuple[str, ...]

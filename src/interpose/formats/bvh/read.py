@@ -25,7 +25,7 @@ class BvhSource:
         header: the part above the motion, with its original text.
         motion: the motion's original text.
         skeleton: the skeleton as read.
-        layout: which column means what; its `unit` is metres per file unit, its `up` "y" or "z".
+        layout: which column means what; its `unit` is metres per file unit, its `up` the axis.
         unit_how, up_how: "given", or how it was estimated.
         positions: "replace" or "add": what position channels of joints that are not roots do to the OFFSET;
             "none" when there are none. Roots' replace it, except where "add" was given.
@@ -48,7 +48,7 @@ class BvhSource:
 
     @property
     def up(self) -> str:
-        """The file's up axis, "y" or "z"."""
+        """The file's up axis, "y", "z", ..."""
         return self.layout.up
 
     @property
@@ -76,7 +76,7 @@ def read(
     Args:
         path: the file.
         unit: metres per file unit, or one of m, cm, mm, inch, CMU; estimated from the legs when None.
-        up: "y" or "z"; estimated from the motion when None.
+        up: the axis that points up, "y", "z", "x", "-y", ...; estimated from the motion when None.
         joint_positions: "replace" or "add": whether position channels replace the OFFSET or are added to it;
             None compares their median with the OFFSET.
         roles: what is said about the joints, see `Skeleton`.
