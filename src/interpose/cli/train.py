@@ -79,3 +79,35 @@ def cae(
     begin = weights.card(start) if start else None
     train_cae(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
     say(f"done: {out}. Next: interpose export cae --run {out} --packs {packs} --out weights/cae")
+
+
+@train.command
+def cmib(
+    *,
+    packs: Path = Path("packs"),
+    out: Path,
+    budget: str = "25m",
+    splits: list[str] = [],  # noqa: B006
+    start: str | None = None,
+) -> None:
+    """Train CMIB, conditional motion in-betweening of Kim et al. An interrupted run goes on where it stopped.
+
+    Try:
+      interpose train cmib --packs packs --out runs/cmib --budget 25m
+
+    Args:
+        packs: the folder with the packs to train on: `interpose data pack` makes them.
+        out: the folder of the run: checkpoints and the log.
+        budget: device time or steps: 25m, 3h, 6000steps.
+        splits: train (the default); train,validation for a final run of fixed budget.
+        start: go on from these installed weights, by name, instead of from nothing.
+    """
+    from interpose.methods import weights
+
+    with needs_torch("train a network"):
+        from interpose.training.budget import Budget
+        from interpose.training.cmib import train_cmib
+    chosen = check_splits(splits)
+    begin = weights.card(start) if start else None
+    train_cmib(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
+    say(f"done: {out}. Next: interpose export cmib --run {out} --packs {packs} --out weights/cmib")
