@@ -108,9 +108,10 @@ def fill(
 
 def _handed(clip: Clip, observation: Observation) -> Clip:
     """The clip with its handedness said, from all that is observed of it: single gaps must not decide."""
-    frames = observation.frames
-    if "hand" in clip.skeleton.roles or not frames.any():
+    frames = np.flatnonzero(observation.frames)
+    if "hand" in clip.skeleton.roles or not frames.size:
         return clip
+    frames = frames[:: max(1, frames.size // 200)]
     body = find_humanoid(clip.with_motion(clip.rotation[frames], clip.translation[frames]))
     roles = {**clip.skeleton.roles, "hand": "left" if body.left_handed else "right"}
     return replace(clip, skeleton=replace(clip.skeleton, roles=roles))

@@ -32,6 +32,7 @@ def pack(cmu_walk):  # type: ignore[no-untyped-def]
         np.concatenate([turned, turned]),
         np.concatenate([root, root]),
         np.tile(body.bones * body.scale, (2, 1, 1)).astype(np.float32),
+        np.tile(body.body, (2, 1, 1)).astype(np.float32),
         np.array([0, count, 2 * count]),
         np.array(["a", "b"]),
         np.array(["subject1", "subject4"]),

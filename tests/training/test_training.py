@@ -34,6 +34,7 @@ def pack(cmu_walk):  # type: ignore[no-untyped-def]
         np.rint(rotations.log(body.rotations(cmu_walk)) / STEP).astype(np.int16),
         (body.root(cmu_walk) * body.scale).astype(np.float32),
         np.tile(body.bones * body.scale, (2, 1, 1)).astype(np.float32),
+        np.tile(body.body, (2, 1, 1)).astype(np.float32),
         np.array([0, half, len(cmu_walk)]),
         np.array(["a", "b"]),
         np.array(["02", "08"]),

@@ -16,6 +16,7 @@ from interpose.datasets.catalogue import FPS, Entry, clips
 from interpose.errors import FileError
 from interpose.geometry import rotations
 from interpose.skeletons import JOINTS, canonical_positions, find_humanoid
+from interpose.skeletons.humanoid import THIGHS
 from interpose.skeletons.rest import Rest
 
 STEP = np.pi / 32767  # radians: rotation vectors in 16 bits, to .003 degrees
@@ -33,6 +34,7 @@ class Pack:
         rotation: (F, 22, 3) int16, canonical rotations (see `Humanoid`) as rotation vectors in units of STEP.
         root: (F, 3) float32 metres, the hips, scaled to the canonical leg.
         bones: (C, 22, 3) float32 metres, each clip's bones in the T-pose, scaled likewise.
+        body: (C, 22, 3) float32 metres, those of the canonical body on which networks see the clip.
         starts: (C + 1,) first frame of each clip, and the end.
         names, performers, labels, splits: (C,) strings.
     """
@@ -41,6 +43,7 @@ class Pack:
     rotation: np.ndarray
     root: np.ndarray
     bones: np.ndarray
+    body: np.ndarray
     starts: np.ndarray
     names: np.ndarray
     performers: np.ndarray
@@ -69,13 +72,16 @@ class Pack:
         return np.diff(self.starts) / FPS
 
     def positions(self) -> np.ndarray:
-        """(F, 22, 3) float32 metres: canonical joints of the body scaled to the canonical leg."""
+        """(F, 22, 3) float32 metres: the motion on the canonical body, see `Humanoid.as_canonical`."""
         placed = np.empty(self.rotation.shape, np.float32)
         clip = np.repeat(np.arange(len(self.names)), np.diff(self.starts))
         for start in range(0, len(clip), BLOCK):
             part = slice(start, start + BLOCK)
             turned = rotations.exp(self.rotation[part] * np.float32(STEP))
-            placed[part] = canonical_positions(turned, self.root[part], self.bones[clip[part]])
+            own, body = self.bones[clip[part]], self.body[clip[part]]
+            thighs = own[:, THIGHS].mean(axis=1) - body[:, THIGHS].mean(axis=1)
+            root = self.root[part] + rotations.rotate(turned[:, 0], thighs)
+            placed[part] = canonical_positions(turned, root, body)
         return placed
 
 
@@ -97,18 +103,22 @@ def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambd
         else:
             chosen.append((entry, clip))
     rests = dict(_rests(chosen))
-    turned, roots, bones = [np.zeros((0, len(JOINTS), 3), np.int16)], [np.zeros((0, 3), np.float32)], []
+    turned, roots = [np.zeros((0, len(JOINTS), 3), np.int16)], [np.zeros((0, 3), np.float32)]
+    bones, bodies = [], []
     for entry, clip in chosen:
         body = find_humanoid(clip, rests[entry.performer])
         turned.append(np.rint(rotations.log(body.rotations(clip)) / STEP).astype(np.int16))
         roots.append((body.root(clip) * body.scale).astype(np.float32))
         bones.append(body.bones * body.scale)
+        bodies.append(body.body)
     lengths = [len(clip) for _, clip in chosen]
+    shape = (len(chosen), len(JOINTS), 3)
     return Pack(
         dataset,
         np.concatenate(turned),
         np.concatenate(roots),
-        np.array(bones, np.float32).reshape(-1, len(JOINTS), 3),
+        np.array(bones, np.float32).reshape(shape),
+        np.array(bodies, np.float32).reshape(shape),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
         np.array([entry.path.stem for entry, _ in chosen]),
         np.array([entry.performer for entry, _ in chosen]),

@@ -178,10 +178,12 @@ def _fit(reach: np.ndarray, wanted: np.ndarray, weights: np.ndarray) -> np.ndarr
     total = np.tile([1.0, 0, 0, 0], (len(reach), 1))
     for _ in range(2):
         size = (weights[:, None] * reach**2).sum(axis=(1, 2))
-        matrix = np.einsum("n,fni,fnj->fij", weights, wanted, reach) + PULL * size[:, None, None] * np.eye(3)
-        u, _, vt = np.linalg.svd(matrix)
-        u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]
-        turn = rotations.from_matrix(u @ vt)
+        # The pull: three axes that would like to stay where they are.
+        stay = np.sqrt(PULL * size)[:, None, None] * np.eye(3)
+        heavy = np.sqrt(weights)[:, None]
+        turn = rotations.fit(
+            np.concatenate([heavy * reach, stay], axis=1), np.concatenate([heavy * wanted, stay], axis=1)
+        )
         reach = rotations.rotate(turn[:, None], reach)
         total = rotations.multiply(turn, total)
     return total

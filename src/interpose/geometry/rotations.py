@@ -253,6 +253,20 @@ def between(a: Array, b: Array) -> Array:
     return normalize(xp.where(present, q, one))
 
 
+def fit(vectors: Array, wanted: Array) -> Array:
+    """The rotation (..., 4) that brings vectors (..., n, 3) nearest to `wanted` (..., n, 3).
+
+    Source: Kabsch, A solution for the best rotation to relate two sets of vectors, 1976.
+    """
+    xp = array_namespace(vectors, wanted)
+    matrix = xp.matmul(xp.moveaxis(wanted, -1, -2), vectors)
+    u, _, vt = xp.linalg.svd(matrix)
+    # A mirror image fits as well: the weakest direction turns round.
+    sign = xp.linalg.det(xp.matmul(u, vt))[..., None]
+    u = xp.concat([u[..., :2], u[..., 2:] * sign[..., None]], axis=-1)
+    return from_matrix(xp.matmul(u, vt))
+
+
 def twist_about(q: Array, axis: Array) -> Array:
     """The part of `q` (..., 4) that turns about the unit vectors `axis` (..., 3).
 

@@ -11,12 +11,14 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip
+from interpose.geometry import rotations
 from interpose.geometry.time import sample, sample_smooth
 from interpose.methods import weights
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons import Humanoid, Mapping, find_humanoid, find_mapping
+from interpose.skeletons.body import facing
 
 # Frames that the network was trained on. It learns where in its window it is, so it gets no other length:
 # with 128 frames it does a quarter worse.
@@ -154,7 +156,7 @@ class Cae:
         card, body = self.card, self._body(clip, observation)
         base = Spline().complete(clip, observation).clip
         known = body.observed(observation.positions(clip.skeleton), observation.rotation)
-        positions = body.positions(clip) * body.scale
+        positions = body.as_canonical(clip)
         times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
@@ -165,7 +167,10 @@ class Cae:
         drift = self._drift(observation, raw, completed, times, body)
         # Past the last thirtieth of a second nothing is known of the network: its last frame is held.
         back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
-        spoken, own = (sample_smooth(out, back) * (body.hand / body.scale) for out in (completed, poses))
+        like = body.rotations(base)
+        ahead = rotations.about("Y", -facing(body.as_canonical(base)))[:, None]
+        spoken = body.from_canonical(sample_smooth(completed, back), like)
+        own = body.from_canonical(sample_smooth(poses, back), rotations.multiply(ahead, like))
         rows, joints = body.mapping.mapped
         notes = {"model": card.name, "drift": drift}
         return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
@@ -173,8 +178,9 @@ class Cae:
     @staticmethod
     def _body(clip: Clip, observation: Observation) -> Humanoid:
         """The humanoid, by what is observed of its motion; where no frame is whole, right-handed."""
-        whole = observation.frames
-        if whole.any():
+        whole = np.flatnonzero(observation.frames)
+        if whole.size:
+            whole = whole[:: max(1, whole.size // 1000)]
             return find_humanoid(clip.with_motion(clip.rotation[whole], clip.translation[whole]))
         hand = {"hand": "right", **clip.skeleton.roles}
         return find_humanoid(replace(clip, skeleton=replace(clip.skeleton, roles=hand)))

@@ -14,6 +14,9 @@ from interpose.skeletons.canonical import BONES, JOINTS, PARENTS
 from interpose.skeletons.mapping import Mapping, find_mapping
 from interpose.skeletons.rest import Rest, find_rest
 
+LENGTHS = np.linalg.norm(BONES, axis=-1)  # of the canonical body
+THIGHS = [JOINTS.index("LeftUpLeg"), JOINTS.index("RightUpLeg")]
+SHORT = 0.01  # metres: what a shorter bone points at means nothing
 CLEAR = 0.04  # the sine of a bend of both knees together, in the mean: less tells nothing
 
 
@@ -76,7 +79,7 @@ class Humanoid:
         return self.mapping.scale
 
     def positions(self, clip: Clip) -> np.ndarray:
-        """(F, 22, 3) canonical joints of a clip of this skeleton, in metres, unscaled."""
+        """(F, 22, 3) canonical joints of a clip of this skeleton, in metres, unscaled, right-handed."""
         self._check()
         turned, placed = self._right(clip).kinematics()
         positions = np.einsum("cj,fjx->fcx", self.mapping.weights, placed)
@@ -133,6 +136,38 @@ class Humanoid:
                 bones[row] = rotations.rotate(rotations.conjugate(turned[:, parent]), away).mean(axis=0)
         return bones
 
+    @cached_property
+    def body(self) -> np.ndarray:
+        """(22, 3) metres: bones, in the T-pose, of the body on which networks see this skeleton's motion.
+
+        All bones are as long for everyone. Where the T-pose is a real pose they also point as everyone's do:
+        what differs there is how skeletons are modelled. Where it is worked out from the motion they point as
+        the skeleton's own do, so that what was worked out does not matter.
+        """
+        if self.rest.how != "motion":
+            return BONES
+        length = np.linalg.norm(self.bones, axis=-1, keepdims=True)
+        return np.where(length > SHORT, self.bones * (LENGTHS[:, None] / np.maximum(length, SHORT)), BONES)
+
+    def as_canonical(self, clip: Clip) -> np.ndarray:
+        """(F, 22, 3) metres: the motion on the canonical body; it stands where the clip's legs do."""
+        turned = self.rotations(clip)
+        placed = self.positions(clip) * self.scale
+        return canonical_positions(turned, _hips_above(placed, turned[:, 0], self.body), self.body)
+
+    def from_canonical(self, points: np.ndarray, like: np.ndarray) -> np.ndarray:
+        """The inverse of `as_canonical`: points (F, 22, 3) of the canonical body as those of this one.
+
+        Points do not tell how bones are twisted, nor exactly how a body of other proportions holds itself:
+        what they leave open is as in `like`, canonical rotations (F, 22, 4) of about the same motion.
+
+        Returns:
+            (F, 22, 3) metres, in the clip's own axes.
+        """
+        turned = pose_of(points, like, self.body)
+        root = _hips_above(points / self.scale, turned[:, 0], self.bones)
+        return canonical_positions(turned, root, self.bones) * self.hand
+
     def to_clip(self, canonical: np.ndarray, root: np.ndarray, like: Clip) -> Clip:
         """A clip of this skeleton from canonical rotations (F, 22, 4) and the place of the hips (F, 3).
 
@@ -172,6 +207,31 @@ class Humanoid:
     def _row(self, joint: int) -> int:
         rows, joints = self.mapping.mapped
         return rows[joints.index(joint)]
+
+
+def _hips_above(placed: np.ndarray, turned: np.ndarray, bones: np.ndarray) -> np.ndarray:
+    """(F, 3) where hips turned by (F, 4) must be for thighs to hang where they do in points (F, 22, 3).
+
+    Hips are a hand above the thighs in some skeletons and level with them in others: bones (22, 3) say it.
+    """
+    return placed[:, THIGHS].mean(axis=1) - rotations.rotate(turned, bones[THIGHS].mean(axis=0))
+
+
+def pose_of(points: np.ndarray, like: np.ndarray, bones: np.ndarray) -> np.ndarray:
+    """(F, 22, 4) canonical rotations near `like`: those of a body with bones (22, 3) at points (F, 22, 3)."""
+    turned = like.copy()
+    for joint in range(len(JOINTS)):
+        below = [child for child, parent in enumerate(PARENTS) if parent == joint]
+        if not below:
+            # What ends here goes on like what it hangs from.
+            parent = PARENTS[joint]
+            turn = rotations.multiply(turned[:, parent], rotations.conjugate(like[:, parent]))
+        else:
+            own = rotations.rotate(like[:, joint, None], bones[below])
+            way = points[:, below] - points[:, joint, None]
+            turn = rotations.between(own[:, 0], way[:, 0]) if len(below) == 1 else rotations.fit(own, way)
+        turned[:, joint] = rotations.multiply(turn, like[:, joint])
+    return turned
 
 
 def reflect(clip: Clip) -> Clip:
