@@ -215,3 +215,16 @@ def test_gradients_are_right(name):
         "6d": lambda v: rotations.from_6d(rotations.to_6d(rotations.exp(v)) * 1.3),
     }[name]
     assert torch.autograd.gradcheck(function, vector, eps=1e-7, atol=1e-6)
+
+
+def test_fit_finds_the_rotation_between_vectors(kind):
+    """And never a mirror image."""
+    rng = np.random.default_rng(0)
+    vectors = rng.normal(size=(40, 5, 3))
+    q = rotations.normalize(rng.normal(size=(40, 4)))
+    wanted = rotations.rotate(q[:, None], vectors)
+    found = kind.numpy(rotations.fit(kind.array(vectors), kind.array(wanted)))
+    assert rotations.angle(found, q).max() < 1e3 * kind.tolerance
+    flat = vectors * [1.0, 1.0, 0.0]
+    mirrored = rotations.fit(kind.array(flat), kind.array(flat * [1, -1, 1]))
+    assert np.allclose(np.linalg.det(kind.numpy(rotations.to_matrix(mirrored))), 1, atol=1e-4)

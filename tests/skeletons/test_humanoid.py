@@ -13,7 +13,15 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.observation import Gap
-from interpose.skeletons import BONES, JOINTS, SIDES, canonical_positions, find_humanoid, find_mapping
+from interpose.skeletons import (
+    BONES,
+    JOINTS,
+    PARENTS,
+    SIDES,
+    canonical_positions,
+    find_humanoid,
+    find_mapping,
+)
 from interpose.skeletons.body import facing
 from interpose.skeletons.humanoid import reflect
 from interpose.skeletons.mirror import mirror
@@ -240,3 +248,40 @@ def test_what_is_no_humanoid_is_said(walk):
     headless = replace(walk, skeleton=replace(walk.skeleton, roles={"Hips": "", "Spine": ""}))
     with pytest.raises(RequestError, match="no humanoid"):
         find_humanoid(headless).root(headless)
+
+
+@pytest.mark.parametrize("rig", ["cmu", "mixamo", "unreal", "child", "makehuman"])
+def test_the_canonical_body_and_back(walk, rig):
+    """The same motion on bones of one size, feet on the ground; and back onto the clip's own bones."""
+    clip = walk if rig == "cmu" else rigs.build(rig, walk)[0]
+    body = find_humanoid(clip)
+    points = body.as_canonical(clip)
+    away = np.linalg.norm(points[:, 1:] - points[:, PARENTS[1:]], axis=-1)
+    assert np.allclose(away, np.linalg.norm(BONES, axis=-1)[1:], atol=1e-9), "everyone's bones"
+    back = body.from_canonical(points, body.rotations(clip))
+    assert np.linalg.norm(back - body.positions(clip), axis=-1).max() < 0.03 / body.scale
+    assert np.linalg.norm(back - body.positions(clip), axis=-1).mean() < 2e-3 / body.scale
+    feet = [JOINTS.index(side + end) for side in ("Left", "Right") for end in ("Foot", "Toe")]
+    lowest = points[:, feet, 1].min(axis=1)
+    own = (body.positions(clip) * body.scale)[:, feet, 1].min(axis=1)
+    assert np.abs(lowest - own).max() < 0.12
+    assert np.std(lowest - own) < 0.02
+
+
+def test_a_t_pose_that_was_worked_out_does_not_matter_for_the_canonical_body(walk):
+    """Rigs without a rest pose: bones point where the clip's do, whatever the T-pose was taken for."""
+    clip, _ = rigs.build("vicon", walk)
+    body = find_humanoid(clip)
+    other = find_humanoid(clip, find_humanoid(clip.slice(60, 100)).rest)
+    assert degrees(body.rest.rotation, other.rest.rotation).max() > 5
+    assert np.abs(body.as_canonical(clip) - other.as_canonical(clip)).max() < 1e-6
+
+
+def test_points_tell_the_pose_near_another_one(walk):
+    """From a pose that is off by some degrees, bones come to point where they should."""
+    body = find_humanoid(walk)
+    points, turned = body.as_canonical(walk), body.rotations(walk)
+    rng = np.random.default_rng(0)
+    like = rotations.multiply(rotations.exp(rng.normal(0, 0.15, (1, 22, 3))), turned)
+    found = body.from_canonical(points, like)
+    assert np.linalg.norm(found - body.positions(walk), axis=-1).mean() < 0.02
