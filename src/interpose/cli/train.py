@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from cyclopts import App
 
@@ -49,6 +50,27 @@ def check_splits(texts: list[str]) -> tuple[str, ...]:
     return splits
 
 
+def _train(
+    recipe: Callable[..., Any],
+    name: str,
+    packs: Path,
+    out: Path,
+    budget: str,
+    splits: list[str],
+    start: str | None,
+) -> None:
+    """Run a recipe as its verb was told."""
+    from interpose.methods import weights
+    from interpose.training.budget import Budget
+
+    chosen = check_splits(splits)
+    begin = weights.card(start) if start else None
+    recipe(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
+    say(f"done: {out}")
+    if name == "cae":
+        say(f"Next: interpose export cae --run {out} --packs {packs} --out weights/cae")
+
+
 @train.command
 def cae(
     *,
@@ -70,15 +92,9 @@ def cae(
         splits: train (the default); train,validation for a final run of fixed budget.
         start: go on from these installed weights, by name, instead of from nothing.
     """
-    from interpose.methods import weights
-
     with needs_torch("train a network"):
-        from interpose.training.budget import Budget
         from interpose.training.cae import train_cae
-    chosen = check_splits(splits)
-    begin = weights.card(start) if start else None
-    train_cae(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
-    say(f"done: {out}. Next: interpose export cae --run {out} --packs {packs} --out weights/cae")
+    _train(train_cae, "cae", packs, out, budget, splits, start)
 
 
 @train.command
@@ -102,12 +118,6 @@ def cmib(
         splits: train (the default); train,validation for a final run of fixed budget.
         start: go on from these installed weights, by name, instead of from nothing.
     """
-    from interpose.methods import weights
-
     with needs_torch("train a network"):
-        from interpose.training.budget import Budget
         from interpose.training.cmib import train_cmib
-    chosen = check_splits(splits)
-    begin = weights.card(start) if start else None
-    train_cmib(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
-    say(f"done: {out}. Next: interpose export cmib --run {out} --packs {packs} --out weights/cmib")
+    _train(train_cmib, "cmib", packs, out, budget, splits, start)
