@@ -4,7 +4,8 @@
 
 From each set the frames of people who walk ahead, upright and at an even pace are taken. What is printed is
 how far the mean canonical rotations of their joints are apart, relative to where the body faces, in degrees;
-beside it how far single walks of one set are from its own mean. The picture shows the walk nearest to each
+beside it how far single walks of one set are from its own mean, and how far LAFAN1 and PFNN, whose skeletons are
+the same, are apart when they share one T-pose, so that only people differ. The picture shows the walk nearest to each
 set's mean. HDM05's classes that were at hand hold no walk.
 """
 
@@ -22,6 +23,7 @@ from interpose.geometry import rotations
 from interpose.show import Take, strip
 from interpose.skeletons import BONES, JOINTS, PARENTS, canonical_positions, find_humanoid
 from interpose.skeletons.body import facing
+from interpose.skeletons.rest import Rest
 
 SETS = {"lafan1": "#2463c8", "pfnn": "#dd5f28", "cmu": "#2a9d5c", "bandai": "#8a4fbf"}
 FRAMES = 48  # of the picture
@@ -52,45 +54,56 @@ def at_30(clip: Clip) -> Clip:
     return clip.with_motion(clip.rotation[::step], clip.translation[::step])
 
 
+def walks(name: str, data: Path, rest: Rest | None = None) -> tuple[np.ndarray, np.ndarray | None]:
+    """Mean rotations (W, 22, 4) of a set's walks; positions (FRAMES, 22, 3) of the one nearest to their mean.
+
+    rest: the T-pose, where it shall not be found for each clip.
+    """
+    entries = [e for e in clips(name, data) if e.split != "test" and (name != "bandai" or "walk" in e.label)]
+    found, shown = [], []
+    for i in np.linspace(0, len(entries) - 1, min(CLIPS, len(entries))).astype(int):
+        clip = at_30(entries[i].load())
+        body = find_humanoid(clip, rest)
+        points = body.positions(clip) * body.scale
+        yaw = facing(points)
+        steady = walking(points, yaw)
+        if steady.sum() < 20:
+            continue
+        turned = rotations.multiply(rotations.about("Y", -yaw)[:, None], body.rotations(clip))
+        found.append(mean(turned[steady]))
+        first = int(np.argmax(ndimage.binary_erosion(steady, np.ones(FRAMES), origin=-(FRAMES // 2))))
+        part = slice(first, first + FRAMES)
+        if steady[part].sum() == FRAMES:
+            way = np.stack([0 * yaw[part], points[part, 0, 1], np.arange(FRAMES) * 1.2 / 30], axis=-1)
+            shown.append((found[-1], canonical_positions(turned[part], way, BONES)))
+    middle = mean(np.array(found))
+    nearest = min(shown, key=lambda one: float(rotations.angle(one[0], middle).mean()), default=None)
+    return np.array(found), nearest[1] if nearest else None
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True, help="the folder that holds the data sets")
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
     given = parser.parse_args()
-    means: dict[str, np.ndarray] = {}
-    spread: dict[str, np.ndarray] = {}
-    takes = []
+    means, spread, takes = {}, [], []
     for name, color in SETS.items():
-        walks, shown = [], []
-        entries = [e for e in clips(name, given.data) if e.split != "test"]
-        entries = [e for e in entries if name != "bandai" or "walk" in e.label]
-        for entry in [
-            entries[i] for i in np.linspace(0, len(entries) - 1, min(CLIPS, len(entries))).astype(int)
-        ]:
-            clip = at_30(entry.load())
-            body = find_humanoid(clip)
-            points = body.positions(clip) * body.scale
-            yaw = facing(points)
-            steady = walking(points, yaw)
-            if steady.sum() < 20:
-                continue
-            turned = rotations.multiply(rotations.about("Y", -yaw)[:, None], body.rotations(clip))
-            walks.append(mean(turned[steady]))
-            first = int(np.argmax(ndimage.binary_erosion(steady, np.ones(FRAMES), origin=-(FRAMES // 2))))
-            part = slice(first, first + FRAMES)
-            if steady[part].sum() == FRAMES:
-                way = np.stack([0 * yaw[part], points[part, 0, 1], np.arange(FRAMES) * 1.2 / 30], axis=-1)
-                shown.append((walks[-1], canonical_positions(turned[part], way, BONES)))
-        means[name] = mean(np.array(walks))
-        spread[name] = np.degrees(rotations.angle(np.array(walks), means[name])).mean(axis=0)
-        print(f"{name}: {len(walks)} walks")
-        if shown:
-            nearest = min(shown, key=lambda walk: float(rotations.angle(walk[0], means[name]).mean()))
-            takes.append(Take(name, nearest[1], color))
+        found, shown = walks(name, given.data)
+        means[name] = mean(found)
+        spread.append(np.degrees(rotations.angle(found, means[name])).mean(axis=0))
+        print(f"{name}: {len(found)} walks")
+        if shown is not None:
+            takes.append(Take(name, shown, color))
     given.out.mkdir(parents=True, exist_ok=True)
     title = "One figure, walks of four data sets"
     strip(takes, PARENTS, 30, [], given.out / "canonical.svg", title, names=JOINTS)
-    print("\n| joint | furthest apart | between | spread within a set |\n| --- | ---: | --- | ---: |")
+    # PFNN's clips are on LAFAN1's skeleton: with one T-pose for both, what is left is how people walk.
+    first = clips("lafan1", given.data, "train")[0]
+    rest = find_humanoid(at_30(first.load())).rest
+    same = [mean(walks(name, given.data, rest)[0]) for name in ("lafan1", "pfnn")]
+    people = np.degrees(rotations.angle(*same))
+    print("\n| joint | furthest apart | between | walks of one set | LAFAN1 and PFNN, one T-pose |")
+    print("| --- | ---: | --- | ---: | ---: |")
     for j, joint in enumerate(JOINTS):
         apart = {
             (a, b): float(np.degrees(rotations.angle(means[a][j], means[b][j])))
@@ -99,8 +112,9 @@ def main() -> None:
             if a < b
         }
         worst = max(apart, key=lambda pair: apart[pair])
-        within = np.mean([held[j] for held in spread.values()])
-        print(f"| {joint} | {apart[worst]:.0f} | {worst[0]}, {worst[1]} | {within:.0f} |")
+        within = np.mean([held[j] for held in spread])
+        between = ", ".join(worst)
+        print(f"| {joint} | {apart[worst]:.0f} | {between} | {within:.0f} | {people[j]:.0f} |")
 
 
 if __name__ == "__main__":
