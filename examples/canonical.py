@@ -4,9 +4,9 @@
 
 From each set the frames of people who walk ahead, upright and at an even pace are taken. What is printed is
 how far the mean canonical rotations of their joints are apart, relative to where the body faces, in degrees;
-beside it how far single walks of one set are from its own mean, and how far LAFAN1 and PFNN, whose skeletons are
-the same, are apart when they share one T-pose, so that only people differ. The picture shows the walk nearest to each
-set's mean. HDM05's classes that were at hand hold no walk.
+beside it how far single walks of one set are from its own mean, and how far LAFAN1 and PFNN, which share a
+skeleton, are apart with one T-pose for both, so that only people differ. The picture shows the walk nearest
+to each set's mean. HDM05's classes that were at hand hold no walk.
 """
 
 from __future__ import annotations
