@@ -210,6 +210,12 @@ def test_graph_agrees_with_torch_at_odd_lengths(graph, walk, frames):
     assert all(np.abs(a - b).max() < 1e-4 for a, b in zip(mine, theirs))
 
 
+def test_graph_tells_nothing_of_the_machine_that_made_it(graph):
+    content = graph[0].read_bytes()
+    assert b"stack_trace" not in content
+    assert b".py" not in content
+
+
 def test_graph_takes_several_clips_at_once(graph, walk):
     path, _ = graph
     positions = np.concatenate([walk[:, :64].numpy(), walk[:, 40:104].numpy()])

@@ -46,11 +46,28 @@ def export_onnx(model: Infiller, path: Path) -> None:
         verbose=False,
     )
     graph = program.model_proto
+    _strip(graph)
     _halve(graph)
     onnx.checker.check_model(graph)
     new = path.with_suffix(".new")
     onnx.save(graph, new)
     os.replace(new, path)
+
+
+def _strip(model: onnx.ModelProto) -> None:
+    """Drop what the exporter notes of the code that it came from, paths of the machine among it."""
+    graph = model.graph
+    for part in (
+        model,
+        graph,
+        *graph.node,
+        *graph.value_info,
+        *graph.input,
+        *graph.output,
+        *graph.initializer,
+    ):
+        part.ClearField("metadata_props")
+        part.ClearField("doc_string")
 
 
 def _halve(model: onnx.ModelProto) -> None:
