@@ -239,13 +239,15 @@ def _check(mapping: Mapping) -> Mapping:
             above = PARENTS[above]
         if joint is None or above < 0 or mapping.joints[above] in skeleton.ancestors(joint):
             continue
-        names_ = skeleton.names[joint], skeleton.names[mapping.joints[above]]  # type: ignore[index]
-        if "given" in (mapping.how[row], mapping.how[above]):
-            raise RequestError(
-                f"{JOINTS[row]} cannot be {names_[0]}",
-                f"it does not hang below {names_[1]}, which is {JOINTS[above]}",
-                "Correct the map; interpose skeleton prints the tree.",
-            )
+        lower, upper = skeleton.names[joint], skeleton.names[mapping.joints[above]]  # type: ignore[index]
+        fix = "Correct the map; interpose skeleton prints the tree."
+        # Who is blamed is what was said, not what was found.
+        if mapping.how[row] == "given":
+            why = f"it does not hang below {upper}, which is {JOINTS[above]}"
+            raise RequestError(f"{JOINTS[row]} cannot be {lower}", why, fix)
+        if mapping.how[above] == "given":
+            why = f"{lower}, which is {JOINTS[row]}, does not hang below it"
+            raise RequestError(f"{JOINTS[above]} cannot be {upper}", why, fix)
         fewer = tuple(None if j == row else own for j, own in enumerate(mapping.joints))
         how = tuple("" if j == row else one for j, one in enumerate(mapping.how))
         return _check(Mapping(skeleton, fewer, how))
