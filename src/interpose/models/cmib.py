@@ -27,6 +27,8 @@ class CmibConfig:
     Attributes:
         labels: action labels; the first is "", for motions without one.
         longest: frames, keys included.
+        residual: whether the network says what to add to the interpolated frames, beginning with nothing
+            (Oreshkin et al. 2022 measured what that brings); the paper's own says whole frames.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -35,6 +37,7 @@ class CmibConfig:
     inner: int = 2048
     dropout: float = 0.05
     longest: int = 160
+    residual: bool = True
 
 
 class Encoder(nn.Module):
@@ -49,12 +52,17 @@ class Encoder(nn.Module):
         )
         self.layers = nn.TransformerEncoder(layer, config.layers, enable_nested_tensor=False)
         self.last = nn.Linear(WIDTH, WIDTH)
+        self.residual = config.residual
+        if self.residual:
+            nn.init.zeros_(self.last.weight)
+            nn.init.zeros_(self.last.bias)
 
     def forward(self, frames: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, T, 154) and labels (B,) to the token (B, 154) and the frames (B, T, 154)."""
         token = self.label(label)[:, None]
-        out = self.last(self.layers(torch.cat([token, frames + self.place[: frames.shape[1]]], dim=1)))
-        return out[:, 0], out[:, 1:]
+        deep = self.layers(torch.cat([token, frames + self.place[: frames.shape[1]]], dim=1))
+        said = self.last(deep[:, 1:])
+        return deep[:, 0], frames + said if self.residual else said
 
 
 def between_keys(values: Tensor, keys: Tensor) -> Tensor:
