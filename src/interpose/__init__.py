@@ -40,6 +40,7 @@ __all__ = [
     "RequestError",
     "Skeleton",
     "__version__",
+    "between",
     "fill",
     "load",
     "method_names",
@@ -161,6 +162,32 @@ def recover(
         seed=seed,
         progress=progress,
     )
+
+
+def between(
+    clip: Clip | str | Path,
+    keys: Sequence[int],
+    action: str = "",
+    *,
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Generate the motion between key frames of a clip; the keys come back unchanged, bit for bit.
+
+    Args:
+        clip: a clip, or the path of one. Its poses between the keys have no influence; what lies before the
+            first and after the last key stays as it is.
+        keys: frame numbers, two or more.
+        action: what the motion is ("walk", "jumps", ...): asks for the method "cmib".
+        method, seed, progress: as in `fill`.
+
+    Returns and raises what `fill` does; RequestError also for keys with nothing between them and for an
+    unknown action, with the list of those there are.
+    """
+    from interpose import tasks
+
+    return tasks.between(_clip(clip), keys, action, method, seed, progress)
 
 
 def _clip(clip: Clip | str | Path) -> Clip:

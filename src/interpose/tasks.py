@@ -47,6 +47,7 @@ def fill(
     seed: int | None = None,
     methods: Mapping[int, str] | None = None,
     progress: Callable[[float], None] | None = None,
+    action: str = "",
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
 
@@ -60,12 +61,14 @@ def fill(
         seed: for methods that sample.
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
+        action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
 
     Returns:
         The completion; `report.open` lists the gaps left open.
 
     Raises:
-        RequestError: a range, a joint, a gap number or a method that does not exist; nothing observed.
+        RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
+            observed.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     check_pins(observation)
@@ -76,7 +79,7 @@ def fill(
             "Leave at least one frame out of the gaps.",
         )
     whole, clip = clip, _handed(clip, observation)
-    jobs = plan(clip, observation, method, max_gap, only, methods or {})
+    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
     said: list[tuple[int, slice, Raw]] = []
@@ -100,7 +103,7 @@ def fill(
             progress((done + 1) / len(work))
     reports = _joined(reports)
     left = [job.gap for job in jobs if job.method is None]
-    report = Report(method, reports, left)
+    report = Report(method, reports, left, action)
     return Completion(
         whole.with_motion(rotation, translation), lambda: _put_together(whole, said), provenance, report
     )
@@ -133,6 +136,43 @@ def recover(
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
+def between(
+    clip: Clip,
+    keys: Sequence[int],
+    action: str = "",
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Completion:
+    """Generate all that lies between key frames of a clip; the keys come back unchanged.
+
+    Args:
+        clip: its poses between the keys have no influence; what lies before the first and after the last key
+            stays as it is.
+        keys: frame numbers, two or more, in any order.
+        action: what the motion is, for methods that know actions.
+        method, seed, progress: as in `fill`.
+
+    Raises:
+        RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
+    """
+    chosen = sorted(set(keys))
+    if bad := [key for key in chosen if not 0 <= key < len(clip)]:
+        raise RequestError(
+            f"there is no frame {bad[0]}",
+            f"the clip has {len(clip)} frames, counted from 0",
+            f"Choose keys from 0 to {len(clip) - 1}.",
+        )
+    gaps = [Gap(a + 1, b) for a, b in zip(chosen, chosen[1:]) if b > a + 1]
+    if not gaps:
+        raise RequestError(
+            "there is nothing between the keys",
+            f"the keys are {', '.join(map(str, chosen)) or 'none'}",
+            "Name two or more that are apart: 0,30,75.",
+        )
+    return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
+
+
 def plan(
     clip: Clip,
     observation: Observation,
@@ -140,6 +180,7 @@ def plan(
     max_gap: int | None,
     only: Sequence[int] | None,
     methods: Mapping[int, str],
+    action: str = "",
 ) -> list[Job]:
     """The runs of incomplete frames, numbered in order of time, each with its method."""
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
@@ -155,10 +196,12 @@ def plan(
         lead = _lead(observation, gap)
         open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
         name, note = methods.get(number, method), None
+        if name == "auto" and action:
+            name = "cmib"
         if name == "auto":
             chosen, note = auto.choose(clip, lead)
         else:
-            chosen = registry.get(name)
+            chosen = registry.told(name, action)
         jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
 

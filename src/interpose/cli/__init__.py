@@ -19,6 +19,7 @@ VERBS = {
     "Your clips": {
         "scan": "find what looks missing: frozen runs, stray rest poses",
         "fill": "fill gaps; what is not missing comes back unchanged",
+        "between": "generate the motion between key poses",
         "recover": "recover joints that are missing in the whole clip or in a range",
         "skeleton": "say which joint is which: how a skeleton is understood",
         "convert": "write a clip in another format, or at another frame rate",

@@ -87,13 +87,13 @@ def _runtime() -> str:
 
 
 def _weights() -> str:
-    from interpose.methods import cae, weights
+    from interpose.methods import weights
 
     cards = weights.cards()
     if not cards:
         weights.find("cae")  # says where they should be
     for card in cards:
-        cae.session(card.onnx)
+        weights.session(card.onnx)
     return ", ".join(f"{card.name} ({card.licence})" for card in cards)
 
 

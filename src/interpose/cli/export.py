@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from cyclopts import App
 
@@ -35,10 +37,39 @@ def cae(
     """
     with needs_torch("export a network"):
         from interpose.training.export import export_cae
+    _export(export_cae, run, packs, out, splits)
+    say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")
+
+
+@export.command
+def cmib(
+    *,
+    run: Path,
+    packs: Path = Path("packs"),
+    out: Path = Path("weights/cmib"),
+    splits: list[str] = [],  # noqa: B006
+) -> None:
+    """Write cmib.onnx, its card cmib.json, and the training log with its curves.
+
+    Try:
+      interpose export cmib --run runs/cmib --packs packs --out weights/cmib
+
+    Args:
+        run: the folder of the training run.
+        packs: the folder with the packs that it was trained on.
+        out: the folder for the weights.
+        splits: what it was trained on: train (the default), or train,validation.
+    """
+    with needs_torch("export a network"):
+        from interpose.training.export import export_cmib
+    _export(export_cmib, run, packs, out, splits)
+
+
+def _export(write: Callable[..., Any], run: Path, packs: Path, out: Path, splits: list[str]) -> None:
+    """Export a run as its verb was told."""
     chosen = check_splits(splits)
     for name in ("averaged.pt", "log.jsonl", "settings.json"):
         if not (run / name).is_file():
-            raise FileError(f"cannot export {run}", f"it has no {name}", "Train first: interpose train cae.")
-    card = export_cae(run, load_packs(packs), out, list(chosen))
+            raise FileError(f"cannot export {run}", f"it has no {name}", "Train first: interpose train.")
+    card = write(run, load_packs(packs), out, list(chosen))
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")
-    say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")

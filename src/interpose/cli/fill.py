@@ -96,6 +96,7 @@ def fill(
             seed=request.seed,
             methods=request.methods,
             progress=advance,
+            action=request.action,
         )
     why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
     return finish("fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force)

@@ -11,6 +11,7 @@ METHODS = {
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
+    "cmib": "conditional in-betweening of Kim et al. 2022: between keys, with an action if you like",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",
 }
 

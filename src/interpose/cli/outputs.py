@@ -1,4 +1,4 @@
-"""What `fill` and `recover` leave behind: the clip, the report that can be replayed, the page to look at."""
+"""What `fill`, `between` and `recover` leave behind: the clip, the report that can be replayed, the page to look at."""
 
 from __future__ import annotations
 
@@ -154,6 +154,7 @@ def to_json(
         "output": str(output),
         **details(clip),
         "method": report["method"],
+        **({"action": report["action"]} if report["action"] else {}),
         "seed": seed,
         "gaps": [entry(gap["number"], gap) for gap in report["gaps"]],
         "open": [

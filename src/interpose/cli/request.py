@@ -26,6 +26,7 @@ class Request:
         seed: for methods that sample.
         why: why a gap stays open, by number, where an earlier report says it.
         said: lines for the user: where the gaps come from.
+        action: what the motion is, for methods that know actions.
     """
 
     gaps: list[Gap]
@@ -35,6 +36,7 @@ class Request:
     seed: int | None = None
     why: dict[int, str] = field(default_factory=dict)
     said: str = ""
+    action: str = ""
 
 
 def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], gaps: Path | None) -> Request:
@@ -111,6 +113,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any]) -> Request:
         content["seed"],
         {one["number"]: one["why"] for one in left},
         f"as in {path}",
+        str(content.get("action", "")),
     )
 
 

@@ -67,8 +67,7 @@ def _train(
     begin = weights.card(start) if start else None
     recipe(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
     say(f"done: {out}")
-    if name == "cae":
-        say(f"Next: interpose export cae --run {out} --packs {packs} --out weights/cae")
+    say(f"Next: interpose export {name} --run {out} --packs {packs} --out weights/{name}")
 
 
 @train.command

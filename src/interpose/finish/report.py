@@ -92,16 +92,17 @@ class GapReport:
 
 @dataclass(frozen=True)
 class Report:
-    """The filled gaps of a clip in order of time, and those left open."""
+    """The filled gaps of a clip in order of time, those left open, and the action that was asked for."""
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
     open: list[Gap] = field(default_factory=list)
+    action: str = ""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
         gaps, left = ([_plain(asdict(gap)) for gap in some] for some in (self.gaps, self.open))
-        return {"method": self.method, "gaps": gaps, "open": left}
+        return {"method": self.method, "action": self.action, "gaps": gaps, "open": left}
 
     def __str__(self) -> str:
         lines = [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]

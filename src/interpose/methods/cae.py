@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -14,10 +11,11 @@ from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import sample, sample_smooth
 from interpose.methods import weights
+from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import Humanoid, Mapping, find_humanoid, find_mapping
+from interpose.skeletons import Humanoid, Mapping, find_mapping
 from interpose.skeletons.body import facing
 
 # Frames that the network was trained on. It learns where in its window it is, so it gets no other length:
@@ -35,17 +33,6 @@ HANDOVER = 12
 LONGEST = 90  # frames, the longest run that one window holds with enough of the motion around it
 
 
-@cache
-def session(path: Path) -> Any:
-    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is."""
-    import onnxruntime
-
-    options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
-    options.inter_op_num_threads = 1
-    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
-
-
 def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run the graph on (B, T, 22, 3) metres of a canonical leg at 30 fps and (B, T, 22) booleans, any T.
 
@@ -61,7 +48,7 @@ def run(path: Path, positions: np.ndarray, observed: np.ndarray) -> tuple[np.nda
         "positions": (positions - origin).astype(np.float32),
         "observed": np.ascontiguousarray(observed),
     }
-    body, raw, completed = (out.astype(float) for out in session(path).run(None, feed))
+    body, raw, completed = (out.astype(float) for out in weights.session(path).run(None, feed))
     return body, raw + origin, completed + origin
 
 
@@ -131,9 +118,8 @@ class Cae:
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: a skeleton that is no humanoid, or a gap beyond what the network was trained for."""
         mapping = find_mapping(clip.skeleton)
-        if not mapping.usable:
-            lacking = ", ".join(mapping.lacking)
-            return f"it fills humanoids only, and no joints were found for {lacking} (--map names them)"
+        if reason := no_humanoid(mapping):
+            return reason
         if gap.joints is not None and not self._moves(mapping, gap.joints):
             return (
                 "no joint that the network knows hangs below these, so positions do not tell their rotation"
@@ -166,7 +152,7 @@ class Cae:
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Positions of the mapped joints at every frame, beside a spline for what positions cannot tell."""
-        card, body = self.card, self._body(clip, observation)
+        card, body = self.card, observed_body(clip, observation)
         base = Spline().complete(clip, observation).clip
         known = body.observed(observation.positions(clip.skeleton), observation.rotation)
         positions = body.as_canonical(clip)
@@ -189,16 +175,6 @@ class Cae:
         rows, joints = body.mapping.mapped
         notes = {"model": card.name, "drift": drift}
         return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
-
-    @staticmethod
-    def _body(clip: Clip, observation: Observation) -> Humanoid:
-        """The humanoid, by what is observed of its motion; where no frame is whole, right-handed."""
-        whole = np.flatnonzero(observation.frames)
-        if whole.size:
-            whole = whole[:: max(1, whole.size // 1000)]
-            return find_humanoid(clip.with_motion(clip.rotation[whole], clip.translation[whole]))
-        hand = {"hand": "right", **clip.skeleton.roles}
-        return find_humanoid(replace(clip, skeleton=replace(clip.skeleton, roles=hand)))
 
     def _drift(
         self,

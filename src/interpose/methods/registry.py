@@ -15,6 +15,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "linear": ("interpose.methods.classical", "Linear"),
     "spline": ("interpose.methods.classical", "Spline"),
     "cae": ("interpose.methods.cae", "Cae"),
+    "cmib": ("interpose.methods.cmib", "Cmib"),
 }
 
 # The entry-point group in which other packages offer methods: name = "package.module:Class".
@@ -53,3 +54,18 @@ def get(name: str) -> Method:
             f"{entry.value} of another package fails with: {error}",
             "Repair or remove that package, or choose another method.",
         ) from error
+
+
+def told(name: str, action: str) -> Method:
+    """The method of that name, told what the motion is ("" for nothing).
+
+    Raises RequestError for a method that knows no actions, and for an action that it does not know.
+    """
+    method = get(name)
+    if not action:
+        return method
+    if not hasattr(method, "for_action"):
+        raise RequestError(
+            f"cannot make it {action} with {name}", f"{name} knows no actions", "Use --method cmib."
+        )
+    return method.for_action(action)

@@ -31,6 +31,7 @@ class Card:
         training: recipe, seed, budget, commit, hours spent.
         metrics: measured figures with the command that printed them.
         auto: what the method `auto` goes by: from `from_gap` frames on the network is better than the spline.
+        labels: action labels that it understands, in its own order; the first is "", for none.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Card:
     training: dict[str, Any] = field(default_factory=dict)
     metrics: dict[str, Any] = field(default_factory=dict)
     auto: dict[str, Any] = field(default_factory=dict)
+    labels: list[str] = field(default_factory=list)
     path: Path = field(default=Path(), compare=False)
 
     @property
@@ -67,6 +69,17 @@ class Card:
             raise FileError(
                 f"cannot read the card {path.name}", str(reason), "Install interpose again to restore it."
             ) from None
+
+
+@cache
+def session(path: Path) -> Any:
+    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is."""
+    import onnxruntime
+
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = 1
+    options.inter_op_num_threads = 1
+    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 
 @cache

@@ -81,6 +81,12 @@ def between_keys(values: Tensor, keys: Tensor) -> Tensor:
     return a + share[..., None] * (b - a)
 
 
+def settle(said: Tensor, frames: Tensor, keys: Tensor) -> Tensor:
+    """What is said of frames (B, T, n), moved so that keys (B, T) are met: what is wrong at them is taken to
+    be wrong, linearly, in between."""
+    return said + between_keys((frames - said)[:, :, None], keys)[:, :, 0]
+
+
 def restore_bones(positions: Tensor, bones: Tensor) -> Tensor:
     """Positions (B, T, 22, 3) with bones brought to their lengths (B, 22), hips first (section 4.2)."""
     done = [positions[..., 0, :]]
@@ -148,7 +154,7 @@ class Cmib(nn.Module):
             Positions (B, T, 22, 3) with bones restored, and rotations (B, T, 22, 4).
         """
         frames, origin, yaw = self.prepare(positions, rotation, keys)
-        _, out = self.encoder(frames, label)
+        out = settle(self.encoder(frames, label)[1], frames, keys)
         count = 3 * len(JOINTS)
         placed = restore_bones(out[..., :count].unflatten(2, (len(JOINTS), 3)), bones)
         turned = rotations.normalize(out[..., count:].unflatten(2, (len(JOINTS), 4)))

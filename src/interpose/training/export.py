@@ -16,6 +16,7 @@ from onnx import TensorProto, helper, numpy_helper
 from interpose.datasets import DATASETS, Pack
 from interpose.methods.weights import Card
 from interpose.models.cae import Infiller
+from interpose.models.cmib import Cmib, CmibConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
 
@@ -30,19 +31,47 @@ OPEN = "any use: trained on CMU data alone"
 
 
 def export_onnx(model: Infiller, path: Path) -> None:
-    """Write the whole method as one graph, for any number of clips and frames.
+    """Write the autoencoder's whole method as one graph, for any number of clips and frames."""
+    positions, observed = torch.randn(2, 97, len(JOINTS), 3), torch.rand(2, 97, len(JOINTS)) > 0.2
+    sizes = _sizes(262144)
+    inputs = {"positions": (positions, sizes), "observed": (observed, sizes)}
+    _write_graph(model, inputs, ["body", "raw", "completed"], path)
+
+
+def export_cmib_onnx(model: Cmib, path: Path) -> None:
+    """Write CMIB's whole method as one graph, for any number of motions and frames up to its longest."""
+    sizes = _sizes(model.config.longest)
+    rotation = torch.nn.functional.normalize(torch.randn(2, 40, len(JOINTS), 4), dim=-1)
+    keys = torch.zeros(2, 40, dtype=torch.bool)
+    keys[:, [0, 20, -1]] = True
+    inputs = {
+        "positions": (torch.randn(2, 40, len(JOINTS), 3), sizes),
+        "rotation": (rotation, sizes),
+        "keys": (keys, sizes),
+        "label": (torch.zeros(2, dtype=torch.long), {0: sizes[0]}),
+        "bones": (torch.rand(2, len(JOINTS)) + 0.1, {0: sizes[0]}),
+    }
+    _write_graph(model, inputs, ["positions_out", "rotation_out"], path)
+
+
+def _sizes(longest: int) -> dict[int, Any]:
+    return {0: torch.export.Dim("clips", min=1, max=4096), 1: torch.export.Dim("frames", min=2, max=longest)}
+
+
+def _write_graph(
+    model: torch.nn.Module, inputs: dict[str, tuple[torch.Tensor, Any]], outputs: list[str], path: Path
+) -> None:
+    """Write a module as ONNX; `inputs` are examples with their dynamic sizes, by name.
 
     Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits.
     """
-    positions, observed = torch.randn(2, 97, len(JOINTS), 3), torch.rand(2, 97, len(JOINTS)) > 0.2
-    sizes = {0: torch.export.Dim("clips", min=1, max=4096), 1: torch.export.Dim("frames", min=2, max=262144)}
     program = torch.onnx.export(
         model.eval().cpu(),
-        (positions, observed),
+        tuple(example for example, _ in inputs.values()),
         dynamo=True,
-        input_names=["positions", "observed"],
-        output_names=["body", "raw", "completed"],
-        dynamic_shapes=(sizes, sizes),
+        input_names=list(inputs),
+        output_names=outputs,
+        dynamic_shapes=tuple(sizes for _, sizes in inputs.values()),
         verbose=False,
     )
     graph = program.model_proto
@@ -92,52 +121,19 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     log, earlier, auto = _history(folder)
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
-    hours = [entry["hours"] for entry in log]
-    line_plot(
-        {"loss": (hours, [entry["loss"] for entry in log])},
-        "device hours",
-        "L1, normalised",
-        "Training of cae",
-        path=out / "loss.svg",
-    )
-    line_plot(
-        {f"gap of {gap} frames": (hours, [entry[f"gap{gap}"] for entry in log]) for gap in (15, 30, 60)},
-        "device hours",
-        "joint error, cm",
-        "Validation performers",
-        path=out / "validation.svg",
-    )
-    data = []
-    for pack in packs:
-        kept = np.isin(pack.splits, splits)
-        frames = int(np.diff(pack.starts)[kept].sum())
-        data.append(
-            {
-                "name": str(pack.dataset),
-                "licence": LICENCES[pack.dataset],
-                "clips": int(kept.sum()),
-                "frames": frames,
-            }
-        )
+    _curves(log, "cae", "L1, normalised", (15, 30, 60), out)
     card = Card(
         name="cae",
         method="cae",
         description="Convolutional autoencoder for infilling (Kaufmann et al. 2020), gaps to 2 s",
-        licence=OPEN if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH,
-        data=sorted(data, key=lambda one: list(DATASETS).index(one["name"])),
+        licence=_licence(packs),
+        data=_data(packs, splits),
         tasks=["fill", "recover"],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=60,
         training={
-            "recipe": "interpose train cae" + (" --start cae" if earlier else ""),
-            **settings,
-            "splits": splits,
-            "steps": log[-1]["step"],
-            "device_hours": log[-1]["hours"],  # from the first start on, as the steps
-            "earlier": earlier,
-            "parameters": sum(p.numel() for p in model.parameters()),
-            "date": datetime.date.today().isoformat(),
+            **_training("cae", settings, splits, log, earlier, model),
             "statistics": {
                 "mean": [round(float(v), 6) for v in model.mean.flatten()],
                 "std": [round(float(v), 6) for v in model.std.flatten()],
@@ -148,6 +144,81 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     )
     card.save(out / "cae.json")
     return card
+
+
+def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+    """Write `cmib.onnx`, `cmib.json`, the training log and its curves into `out` from a run's folder."""
+    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    config = settings.pop("config")
+    model = Cmib(CmibConfig(**{**config, "labels": tuple(config["labels"])}))
+    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
+    out.mkdir(parents=True, exist_ok=True)
+    export_cmib_onnx(model, out / "cmib.onnx")
+    log, earlier, _ = _history(folder)
+    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    _curves(log, "cmib", "weighted loss", (30, 60, 120), out)
+    labels = config.pop("labels")
+    card = Card(
+        name="cmib",
+        method="cmib",
+        description="Conditional motion in-betweening (Kim et al. 2022) between keys, with action labels",
+        licence=_licence(packs),
+        data=_data(packs, splits),
+        tasks=["fill", "between"],
+        joints=list(JOINTS),
+        fps=30.0,
+        max_gap=settings["longest"] - 2,  # a length counts both keys
+        training={**_training("cmib", settings, splits, log, earlier, model), "config": config},
+        metrics={"validation": log[-1]},
+        labels=labels,
+    )
+    card.save(out / "cmib.json")
+    return card
+
+
+def _licence(packs: list[Pack]) -> str:
+    return OPEN if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH
+
+
+def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
+    """What of the packs was trained on, for the card."""
+    data = []
+    for pack in packs:
+        kept = np.isin(pack.splits, splits)
+        frames = int(np.diff(pack.starts)[kept].sum())
+        name = str(pack.dataset)
+        data.append({"name": name, "licence": LICENCES[name], "clips": int(kept.sum()), "frames": frames})
+    return sorted(data, key=lambda one: list(DATASETS).index(one["name"]))
+
+
+def _training(
+    name: str,
+    settings: dict[str, Any],
+    splits: list[str],
+    log: list[dict[str, Any]],
+    earlier: list[dict[str, Any]],
+    model: torch.nn.Module,
+) -> dict[str, Any]:
+    """How the weights came to be, for the card."""
+    return {
+        "recipe": f"interpose train {name}" + (f" --start {name}" if earlier else ""),
+        **settings,
+        "splits": splits,
+        "steps": log[-1]["step"],
+        "device_hours": log[-1]["hours"],  # from the first start on, as the steps
+        "earlier": earlier,
+        "parameters": sum(p.numel() for p in model.parameters()),
+        "date": datetime.date.today().isoformat(),
+    }
+
+
+def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ...], out: Path) -> None:
+    """Draw the loss, and the errors on validation performers, over device hours."""
+    hours = [entry["hours"] for entry in log]
+    loss = {"loss": (hours, [entry["loss"] for entry in log])}
+    line_plot(loss, "device hours", unit, f"Training of {name}", path=out / "loss.svg")
+    errors = {f"gap of {gap} frames": (hours, [entry[f"gap{gap}"] for entry in log]) for gap in gaps}
+    line_plot(errors, "device hours", "joint error, cm", "Validation performers", path=out / "validation.svg")
 
 
 def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], dict[str, Any]]:

@@ -1,0 +1,132 @@
+"""Conditional in-betweening (Kim et al. 2022) as a method: from keys on the user's skeleton and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import unknown
+from interpose.geometry import rotations
+from interpose.geometry.time import sample_rotations_smooth, sample_smooth
+from interpose.methods import weights
+from interpose.methods.bodies import no_humanoid, observed_body
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+from interpose.skeletons import find_mapping
+from interpose.skeletons.humanoid import canonical_positions
+
+ANCHORS = 3  # at most, as in training
+
+
+def passes(complete: np.ndarray, longest: float) -> list[list[int]]:
+    """The key frames of each pass of the network over a motion of which frames (F,) are complete.
+
+    A gap is generated between the frames right before and after it. Gaps that share a lone key are generated
+    as one motion with that key as an anchor, up to ANCHORS of them and `longest` frames. Gaps that are open
+    at one end are in no pass.
+    """
+    edges = np.flatnonzero(np.diff(complete.astype(int)))  # the last frames of runs
+    bounds = [(a, b + 1) for a, b in zip(edges, edges[1:]) if not complete[a + 1]]
+    done: list[list[int]] = []
+    for start, stop in bounds:
+        keys = done[-1] if done else []
+        if keys and keys[-1] == start and len(keys) <= ANCHORS + 1 and stop - keys[0] < longest:
+            keys.append(int(stop))
+        else:
+            done.append([int(start), int(stop)])
+    return done
+
+
+def run(
+    path: Path, positions: np.ndarray, rotation: np.ndarray, keys: np.ndarray, label: int, bones: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Run the graph on one motion at 30 fps.
+
+    Args:
+        path: of the graph.
+        positions: (T, 22, 3) metres of a body scaled to the canonical leg; only key frames count.
+        rotation: (T, 22, 4) canonical rotations.
+        keys: (T,) booleans; the first and the last frame are keys.
+        label: index of the action.
+        bones: (22,) lengths in metres.
+
+    Returns:
+        The hips (T, 3) and canonical rotations (T, 22, 4), float64.
+    """
+    # Far from the origin float32 would lose millimetres.
+    origin = positions[0, 0] * [1.0, 0.0, 1.0]
+    feed = {
+        "positions": (positions - origin)[None].astype(np.float32),
+        "rotation": rotation[None].astype(np.float32),
+        "keys": keys[None],
+        "label": np.array([label]),
+        "bones": bones[None].astype(np.float32),
+    }
+    placed, turned = (out[0].astype(float) for out in weights.session(path).run(None, feed))
+    return placed[:, 0] + origin, rotations.normalize(turned)
+
+
+@dataclass(frozen=True)
+class Cmib:
+    """Generates whole poses between keys; thinks at 30 fps on 22 joints scaled to one leg.
+
+    Attributes:
+        action: a label of its card; "" leaves it open.
+    """
+
+    action: str = ""
+    name = "cmib"
+
+    @property
+    def card(self) -> weights.Card:
+        return weights.find(self.name)
+
+    def for_action(self, action: str) -> Cmib:
+        """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
+        if action not in self.card.labels:
+            raise unknown("action", action, [label for label in self.card.labels if label])
+        return Cmib(action)
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        """Why not: no humanoid, single joints, no key on one side, or more frames than it knows."""
+        if reason := no_humanoid(find_mapping(clip.skeleton)):
+            return reason
+        if gap.joints is not None:
+            return "it generates whole poses only"
+        if gap.start == 0 or gap.stop == len(clip):
+            return "it needs a whole pose on both sides"
+        length = len(gap) * self.card.fps / clip.fps
+        if length > self.card.max_gap:
+            at = f"{length:.0f} frames at {self.card.fps:g} fps"
+            return f"{at} are more than the {self.card.max_gap} it can fill"
+        return None
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        """Rotations of the mapped joints and the way of the hips between keys; a spline for all else."""
+        card, body = self.card, observed_body(clip, observation)
+        base = Spline().complete(clip, observation).clip
+        turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
+        placed = canonical_positions(turned, root, bones)
+        label, lengths = card.labels.index(self.action), np.linalg.norm(bones, axis=-1)
+        step = clip.fps / card.fps
+        for keys in passes(observation.frames, (card.max_gap + 1) * step + 1):
+            first, last = keys[0], keys[-1]
+            # Both ends lie on the network's grid; its frames may be a little longer or shorter for that.
+            count = max(3, round((last - first) / step) + 1)
+            scale = (count - 1) / (last - first)
+            slots = np.rint((np.array(keys) - first) * scale).astype(int)
+            known = np.zeros(count, bool)
+            positions = np.zeros((count, *placed.shape[1:]))
+            rotation = np.tile([1.0, 0.0, 0.0, 0.0], (count, turned.shape[1], 1))
+            known[slots], positions[slots], rotation[slots] = True, placed[keys], turned[keys]
+            hips, said = run(card.onnx, positions, rotation, known, label, lengths)
+            inside = np.setdiff1d(np.arange(first, last), keys)
+            back = (inside - first) * scale
+            root[inside] = sample_smooth(hips, back)
+            turned[inside] = sample_rotations_smooth(rotations.continuous(said), back)
+        done = body.to_clip(turned, root / body.scale, base)
+        return Raw(done, notes={"model": card.name, "action": self.action})
