@@ -19,6 +19,8 @@ from interpose.skeletons.body import facing
 
 WIDTH = 7 * len(JOINTS)  # a position and a quaternion of each of the 22 joints: 154
 
+PLACE = 0.3  # deviation of learned positions at first: of about the size of the numbers of a frame
+
 
 @dataclass(frozen=True)
 class CmibConfig:
@@ -27,8 +29,10 @@ class CmibConfig:
     Attributes:
         labels: action labels; the first is "", for motions without one.
         longest: frames, keys included.
-        residual: whether the network says what to add to the interpolated frames, beginning with nothing
-            (Oreshkin et al. 2022 measured what that brings); the paper's own says whole frames.
+        residual: what later work found to train faster, and False for the paper's own network. The network
+            says what to add to the interpolated frames, beginning with nothing (Oreshkin et al. 2022);
+            learned positions count frames from the key before and to the key after, not from the start (Qin
+            et al. 2022 tell the distance to keys likewise); layers are normalised before, not after.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -46,23 +50,40 @@ class Encoder(nn.Module):
     def __init__(self, config: CmibConfig) -> None:
         super().__init__()
         self.label = nn.Embedding(len(config.labels), WIDTH)
-        self.place = nn.Parameter(0.02 * torch.randn(config.longest, WIDTH))
-        layer = nn.TransformerEncoderLayer(
-            WIDTH, config.heads, config.inner, config.dropout, activation="gelu", batch_first=True
-        )
-        self.layers = nn.TransformerEncoder(layer, config.layers, enable_nested_tensor=False)
-        self.last = nn.Linear(WIDTH, WIDTH)
         self.residual = config.residual
+        self.place = nn.ParameterList(
+            PLACE * torch.randn(config.longest, WIDTH) for _ in range(2 if self.residual else 1)
+        )
+        layer = nn.TransformerEncoderLayer(
+            WIDTH,
+            config.heads,
+            config.inner,
+            config.dropout,
+            activation="gelu",
+            batch_first=True,
+            norm_first=self.residual,
+        )
+        norm = nn.LayerNorm(WIDTH) if self.residual else None
+        self.layers = nn.TransformerEncoder(layer, config.layers, norm, enable_nested_tensor=False)
+        self.last = nn.Linear(WIDTH, WIDTH)
         if self.residual:
             nn.init.zeros_(self.last.weight)
             nn.init.zeros_(self.last.bias)
 
-    def forward(self, frames: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, T, 154) and labels (B,) to the token (B, 154) and the frames (B, T, 154)."""
+    def forward(self, frames: Tensor, keys: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, T, 154), key frames (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
         token = self.label(label)[:, None]
-        deep = self.layers(torch.cat([token, frames + self.place[: frames.shape[1]]], dim=1))
+        deep = self.layers(torch.cat([token, frames + self._places(keys)], dim=1))
         said = self.last(deep[:, 1:])
         return deep[:, 0], frames + said if self.residual else said
+
+    def _places(self, keys: Tensor) -> Tensor:
+        """Learned positions, (B, T, 154) or (T, 154)."""
+        if not self.residual:
+            return self.place[0][: keys.shape[1]]
+        last, first = neighbours(keys)
+        frame = torch.arange(keys.shape[1], device=keys.device)
+        return self.place[0][(frame - last).clamp(min=0)] + self.place[1][(first - frame).clamp(min=0)]
 
 
 def between_keys(values: Tensor, keys: Tensor) -> Tensor:
@@ -154,7 +175,7 @@ class Cmib(nn.Module):
             Positions (B, T, 22, 3) with bones restored, and rotations (B, T, 22, 4).
         """
         frames, origin, yaw = self.prepare(positions, rotation, keys)
-        out = settle(self.encoder(frames, label)[1], frames, keys)
+        out = settle(self.encoder(frames, keys, label)[1], frames, keys)
         count = 3 * len(JOINTS)
         placed = restore_bones(out[..., :count].unflatten(2, (len(JOINTS), 3)), bones)
         turned = rotations.normalize(out[..., count:].unflatten(2, (len(JOINTS), 4)))
