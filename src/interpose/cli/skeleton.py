@@ -155,6 +155,8 @@ def _t_pose(body: Humanoid) -> str:
     """Where the T-pose comes from, in words."""
     if body.rest.how == "motion":
         return "its zero pose (all rotations 0) is no T- or A-pose: the T-pose was worked out from the motion"
+    if body.rest.how == "rig":
+        return "its zero pose (all rotations 0) is no T- or A-pose: the T-pose is the one known of this rig"
     if body.rest.how == "zero pose":
         kinds = {"T": "a T-pose", "A": "an A-pose", "arms down": "a pose with arms down"}
         return f"its zero pose is {kinds[body.rest.pose]}"

@@ -141,10 +141,10 @@ class Humanoid:
         """(22, 3) metres: bones, in the T-pose, of the body on which networks see this skeleton's motion.
 
         All bones are as long for everyone. Where the T-pose is a real pose they also point as everyone's do:
-        what differs there is how skeletons are modelled. Where it is worked out from the motion they point as
+        what differs there is how skeletons are modelled. Where it was worked out from motion they point as
         the skeleton's own do, so that what was worked out does not matter.
         """
-        if self.rest.how != "motion":
+        if self.rest.how not in ("motion", "rig"):
             return BONES
         length = np.linalg.norm(self.bones, axis=-1, keepdims=True)
         return np.where(length > SHORT, self.bones * (LENGTHS[:, None] / np.maximum(length, SHORT)), BONES)

@@ -18,6 +18,7 @@ from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
 from interpose.skeletons.canonical import BONES, JOINTS, PARENTS
 from interpose.skeletons.mapping import TRUNK, Mapping
+from interpose.skeletons.rigs import known_rest
 
 X, Y, Z = np.eye(3)
 # The joint that a limb's bone leads to.
@@ -55,7 +56,7 @@ class Rest:
         rotation: (22, 4) global rotations of the skeleton's joints in it, by canonical joint; where a joint
             is missing that of the one above it.
         pose: what the skeleton's zero pose is: "T", "A", "arms down", or "none".
-        how: where the T-pose comes from: "zero pose", "frame N" or "motion".
+        how: where the T-pose comes from: "zero pose", "frame N", "rig" (one that is known) or "motion".
     """
 
     rotation: np.ndarray
@@ -102,13 +103,20 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
     pose = _kind(mapping, placed)
     if pose != "none":
         return Rest(_from_pose(mapping, turned, placed), pose, "zero pose")
+    if known := known_rest(skeleton):
+        return Rest(known[1], pose, "rig")
     if clip is None or len(clip) == 0:
         raise RequestError(
             "the T-pose cannot be found",
             "the zero pose is none, and there is no motion to tell it",
             "Give a clip with some motion, or name a rest frame.",
         )
-    return Rest(_Estimate(mapping, clip).rotation(), pose, "motion")
+    return Rest(estimate(mapping, clip), pose, "motion")
+
+
+def estimate(mapping: Mapping, clip: Clip) -> np.ndarray:
+    """(22, 4) the T-pose of a skeleton whose zero pose is none, worked out from its bones and a motion."""
+    return _Estimate(mapping, clip).rotation()
 
 
 def _frame(mapping: Mapping, placed: np.ndarray) -> np.ndarray:

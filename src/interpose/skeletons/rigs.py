@@ -1,0 +1,50 @@
+"""T-poses of widespread rigs whose zero pose is none, so that not every clip has to tell them anew.
+
+`examples/tposes.py` works them out from many clips of several people and writes the file.
+"""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Skeleton
+from interpose.geometry import kinematics, rotations
+
+RIGS = Path(__file__).with_name("rigs.json")
+LEAST = 0.01  # metres: bones that are shorter have no direction
+LIKE = 0.98  # the cosine by which bones of a zero pose may point elsewhere
+
+
+@cache
+def _rigs() -> list[dict[str, Any]]:
+    return json.loads(RIGS.read_text()) if RIGS.exists() else []  # type: ignore[no-any-return]
+
+
+def directions(skeleton: Skeleton) -> np.ndarray:
+    """(J, 3) where bones point in the zero pose; 0 for those that have no length."""
+    bones = skeleton.rest_translation * skeleton.scale_above[:, None]
+    _, placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)
+    above = [max(parent, 0) for parent in skeleton.parents]
+    away = placed - placed[above]
+    length = np.linalg.norm(away, axis=1, keepdims=True)
+    return np.where(length > LEAST, away / np.maximum(length, LEAST), 0.0)
+
+
+def known_rest(skeleton: Skeleton) -> tuple[str, np.ndarray] | None:
+    """The name and the T-pose (22, 4) of the rig that a skeleton is, or None for all others.
+
+    Names, their order, and the zero pose must be those of the rig.
+    """
+    for rig in _rigs():
+        if list(skeleton.names) != rig["names"]:
+            continue
+        own, its = directions(skeleton), np.array(rig["directions"])
+        both = (own != 0).any(axis=1) & (its != 0).any(axis=1)
+        if both.any() and ((own * its).sum(axis=1)[both] > LIKE).all():
+            return rig["rig"], rotations.normalize(np.array(rig["rotation"]))
+    return None
