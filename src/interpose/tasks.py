@@ -173,6 +173,33 @@ def between(
     return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
 
 
+def block(poses: Mapping[int, Clip]) -> Clip:
+    """A clip from poses by frame: the key frames that `between` goes by. Each pose holds until the next.
+
+    Args:
+        poses: clips of one frame on skeletons with the same joints, frame 0 among them: its skeleton, frame
+            rate and file layout are the result's.
+
+    Raises:
+        RequestError: the skeletons differ.
+    """
+    first = poses[0]
+    for frame, pose in poses.items():
+        if pose.skeleton.names != first.skeleton.names or pose.translated != first.translated:
+            odd = sorted({*pose.skeleton.names} ^ {*first.skeleton.names})
+            raise RequestError(
+                f"the pose at frame {frame} is on another skeleton than the first",
+                f"joints that only one of them has: {', '.join(odd[:6])}" if odd else "joints differ in kind",
+                "Use poses of one character.",
+            )
+    held = np.repeat(sorted(poses), np.diff([*sorted(poses), max(poses) + 1]))
+    rotation, translation = (
+        np.concatenate([getattr(poses[frame], name) for frame in held])
+        for name in ("rotation", "translation")
+    )
+    return first.with_motion(rotation, translation)
+
+
 def plan(
     clip: Clip,
     observation: Observation,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
@@ -12,12 +12,19 @@ from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
 
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+
 
 def between(
-    file: Path,
+    file: Path | None = None,
     /,
     *,
-    keys: list[str],
+    keys: list[str] = [],  # noqa: B006
+    start: str | None = None,
+    target: str | None = None,
+    frames: int | None = None,
+    anchor: list[str] = [],  # noqa: B006
     action: str = "",
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
@@ -29,17 +36,26 @@ def between(
 ) -> int:
     """Generate the motion between key poses; the keys themselves come back unchanged.
 
-    What lies between the keys in the file has no influence; what lies
-    before the first and after the last one stays as it is. Writes the clip
-    and a report beside the input: keys.between.bvh and keys.between.json.
+    Keys are frames of one file, or poses of several: then the motion begins
+    with --start, --frames new frames follow, and --target is the last. What
+    lies between the keys of a file has no influence; what lies before the
+    first and after the last one stays as it is. Writes the clip and a report
+    beside the input: keys.between.bvh and keys.between.json.
 
     Try:
       interpose between keys.bvh --keys 0,30,75
       interpose between keys.bvh --keys 0,30,75 --action jumps --player
+      interpose between --start walk.bvh --target sit.bvh --frames 45
+      interpose between --start walk.bvh#80 --target sit.bvh#0 --frames 45 --anchor turn.bvh#12@20
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        keys: the frames that are keys, separated by commas, counted from 0.
+        keys: the frames of the file that are keys, separated by commas, counted from 0.
+        start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
+        target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
+        frames: how many frames to generate between --start and --target.
+        anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
+            repeated.
         action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
@@ -51,13 +67,21 @@ def between(
     from interpose import tasks
     from interpose.cli.request import check_method
 
-    frames = [_frame(text) for text in split_names(keys)]
     check_method(method)
-    clip = reading.load(file)
+    if file is not None and not (start or target or frames or anchor):
+        chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
+    elif file is None and not keys and start and target and frames is not None:
+        file, chosen, clip = _blocked(start, target, frames, anchor, reading)
+    else:
+        raise RequestError(
+            "it is not clear what the keys are",
+            "they are frames of one file, or poses of several",
+            "Write keys.bvh --keys 0,30,75, or --start a.bvh --target b.bvh --frames 45.",
+        )
     outputs = Outputs.choose(file, output, "between", player)
     outputs.check(file, force)
-    with progress(f"generating what lies between {len(frames)} keys of {file.name}", len(clip)) as advance:
-        done = tasks.between(clip, frames, action, method, seed, advance)
+    with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
+        done = tasks.between(clip, chosen, action, method, seed, advance)
     return finish("between", file, outputs, clip, done, seed, {}, json=json, force=force)
 
 
@@ -65,3 +89,36 @@ def _frame(text: str) -> int:
     if not text.isdecimal():
         raise RequestError(f"cannot read the key {text}", "it is no frame number", "Write --keys 0,30,75.")
     return int(text)
+
+
+def _blocked(
+    start: str, target: str, frames: int, anchors: list[str], reading: Reading
+) -> tuple[Path, list[int], Clip]:
+    """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip."""
+    from interpose import tasks
+
+    if frames < 1:
+        raise RequestError(f"cannot generate {frames} frames", "it takes 1 or more", "Write --frames 45.")
+    file, first = _pose(start, -1, reading)
+    poses = {0: first, frames + 1: _pose(target, 0, reading)[1]}
+    for text in anchors:
+        what, _, at = text.rpartition("@")
+        if not what or not at.isdecimal() or not 0 < int(at) <= frames:
+            why = f"it is FILE@AT, with AT from 1 to {frames}"
+            raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
+        poses[int(at)] = _pose(what, 0, reading)[1]
+    return file, sorted(poses), tasks.block(poses)
+
+
+def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip]:
+    """FILE or FILE#FRAME: the file, and the pose as a clip of one frame."""
+    name, _, frame = text.rpartition("#")
+    file, number = (Path(name), int(frame)) if name and frame.isdecimal() else (Path(text), None)
+    clip = reading.load(file)
+    if number is None:
+        number = usual % len(clip)
+    if number >= len(clip):
+        why = f"the clip has {len(clip)} frames, counted from 0"
+        raise RequestError(f"there is no frame {number} in {file}", why, f"Choose up to {len(clip) - 1}.")
+    part = slice(number, number + 1)
+    return file, clip.with_motion(clip.rotation[part], clip.translation[part])

@@ -1,4 +1,4 @@
-"""What `fill`, `between` and `recover` leave behind: clip, a report that can be replayed, a page to look at."""
+"""What `fill`, `between` and `recover` leave behind: clip, report (to be replayed), and a page to look at."""
 
 from __future__ import annotations
 

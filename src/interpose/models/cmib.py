@@ -71,7 +71,7 @@ class Encoder(nn.Module):
             nn.init.zeros_(self.last.bias)
 
     def forward(self, frames: Tensor, keys: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, T, 154), key frames (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
+        """Frames (B, T, 154), keys (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
         token = self.label(label)[:, None]
         deep = self.layers(torch.cat([token, frames + self._places(keys)], dim=1))
         said = self.last(deep[:, 1:])

@@ -1,0 +1,79 @@
+"""interpose between: keys of one file, poses of several, actions, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from interpose.formats import load
+from interpose.methods import weights
+
+TRAINED = any(card.method == "cmib" for card in weights.cards())
+
+
+def test_keys_come_back_and_the_rest_is_new(run, take):
+    done = run("between", "take.bvh", "--keys", "10,40,90", "--method", "linear")
+    assert done.code == 0
+    before, after = load(take), load(take.with_name("take.between.bvh"))
+    kept = [*range(11), 40, *range(90, len(before))]
+    assert np.array_equal(after.rotation[kept], before.rotation[kept])
+    assert np.array_equal(after.translation[kept], before.translation[kept])
+    assert not np.allclose(after.rotation[60], before.rotation[60])
+    report = json.loads(take.with_name("take.between.json").read_text())
+    assert [gap["frames"] for gap in report["gaps"]] == ["11:40", "41:90"]
+    assert report["verb"] == "between"
+
+
+@pytest.mark.skipif(not TRAINED, reason="no weights of cmib")
+def test_an_action_asks_for_cmib_and_is_replayed(run, take):
+    done = run("between", "take.bvh", "--keys", "10,40,90", "--action", "walk", "--json")
+    assert {gap["method"] for gap in done.json["gaps"]} == {"cmib"}
+    assert done.json["action"] == "walk"
+    again = run("fill", "take.bvh", "--gaps", "take.between.json", "-o", "again.bvh")
+    assert again.code == 0
+    first, second = (take.with_name(name).read_bytes() for name in ("take.between.bvh", "again.bvh"))
+    assert first == second
+
+
+@pytest.mark.skipif(not TRAINED, reason="no weights of cmib")
+def test_an_unknown_action_is_refused_with_the_choices(run, take):
+    done = run("between", "take.bvh", "--keys", "10,40", "--action", "wlk")
+    assert done.code == 2
+    assert "walk" in done.err
+    assert run("between", "take.bvh", "--keys", "10,40", "--action", "walk", "--method", "linear").code == 2
+
+
+def test_poses_of_several_files(run, take):
+    poses = ["--start", "take.bvh#10", "--target", "take.bvh", "--anchor", "take.bvh#30@20"]
+    assert run("between", *poses, "--frames", "44", "-o", "new.bvh", "--method", "spline").code == 0
+    source, made = load(take), load(take.with_name("new.bvh"))
+    assert len(made) == 46
+    assert made.fps == source.fps
+    for frame, was in ((0, 10), (20, 30), (45, 0)):
+        assert np.array_equal(made.rotation[frame], source.rotation[was])
+        assert np.array_equal(made.translation[frame], source.translation[was])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["take.bvh"], "nothing between"),
+        (["take.bvh", "--keys", "5,6"], "nothing between"),
+        (["take.bvh", "--keys", "0,9000"], "no frame 9000"),
+        (["take.bvh", "--keys", "0,ten"], "cannot read the key ten"),
+        (["take.bvh", "--keys", "0,9", "--start", "take.bvh"], "not clear"),
+        (["--start", "take.bvh", "--frames", "5"], "not clear"),
+        (["--start", "take.bvh", "--target", "take.bvh", "--frames", "0"], "cannot generate 0"),
+        (["--start", "take.bvh#999", "--target", "take.bvh", "--frames", "5"], "no frame 999"),
+        (["--start", "take.bvh", "--target", "take.bvh", "--frames", "5", "--anchor", "take.bvh@6"], "@6"),
+        (["--start", "take.bvh", "--target", "none.bvh", "--frames", "5"], "none.bvh"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_three_lines(run, take, options, said):
+    done = run("between", *options)
+    assert done.code in (2, 3)
+    assert len(done.err.splitlines()) == 3
+    assert said in done.err
+    assert not list(take.parent.glob("*.between.*"))

@@ -1,0 +1,76 @@
+"""CMIB as a method: which keys belong to one pass, what it refuses, and that its motion follows the input."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose import tasks
+from interpose.errors import RequestError
+from interpose.geometry import rotations
+from interpose.methods import registry, weights
+from interpose.methods.cmib import passes
+from interpose.observation import Gap, Observation
+
+trained = pytest.mark.skipif(
+    not any(card.method == "cmib" for card in weights.cards()), reason="no weights of cmib"
+)
+
+
+def keys_of(text: str, longest: float = 131) -> list[list[int]]:
+    return passes(np.array([c == "o" for c in text]), longest)
+
+
+def test_gaps_that_share_a_lone_key_are_one_motion():
+    assert keys_of("oo...oo") == [[1, 5]]
+    assert keys_of("o..o..o") == [[0, 3, 6]]
+    assert keys_of("o..oo..o") == [[0, 3], [4, 7]]
+    assert keys_of("..o..o..") == [[2, 5]], "open ends are nobody's"
+    assert keys_of("ooo") == keys_of("...") == []
+
+
+def test_a_pass_has_no_more_anchors_or_frames_than_in_training():
+    assert keys_of("o." * 6 + "o") == [[0, 2, 4, 6, 8], [8, 10, 12]]
+    assert keys_of("o...o...o", longest=8) == [[0, 4], [4, 8]]
+    assert keys_of("o...o...o", longest=9) == [[0, 4, 8]]
+
+
+def test_methods_without_actions_say_so():
+    with pytest.raises(RequestError, match="spline knows no actions"):
+        registry.told("spline", "walk")
+
+
+@trained
+def test_it_refuses_what_it_cannot_do(cmu_walk):
+    method, last = registry.get("cmib"), len(cmu_walk)
+    for gap, why in (
+        (Gap(0, 5), "both sides"),
+        (Gap(last - 5, last), "both sides"),
+        (Gap(3, 9, ("LeftArm",)), "whole poses"),
+    ):
+        assert why in method.refuses(cmu_walk, gap)
+    assert method.refuses(cmu_walk, Gap(3, 9)) is None
+
+
+@trained
+def test_raw_motion_meets_the_keys(cmu_walk):
+    seen = Observation.from_gaps(cmu_walk, [Gap(11, 40), Gap(41, 80)])
+    raw = registry.get("cmib").complete(cmu_walk, seen)
+    keys = [10, 40, 80]
+    assert rotations.angle(raw.clip.rotation[keys], cmu_walk.rotation[keys]).max() < 1e-6
+    beside = np.linalg.norm(raw.clip.root[[11, 39, 41]] - cmu_walk.root[[10, 40, 40]], axis=-1)
+    assert beside.max() < 0.1
+
+
+@trained
+def test_the_motion_turns_with_the_clip_and_the_action_matters(cmu_walk):
+    turn = rotations.about("Y", np.array(2.0))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    turned = cmu_walk.with_motion(rotation, rotations.rotate(turn, cmu_walk.translation))
+    keys = (20, 50, 90)
+    done = tasks.between(cmu_walk, keys, "walk").clip.positions()
+    other = tasks.between(turned, keys, "walk").clip.positions()
+    assert np.abs(rotations.rotate(turn, done) - other).max() < 5e-3
+    jump = tasks.between(cmu_walk, keys, "ground").clip.positions()
+    assert np.abs(jump - done)[21:50].max() > 1e-3
