@@ -32,7 +32,8 @@ class CmibConfig:
         residual: what later work found to train faster, and False for the paper's own network. The network
             says what to add to the interpolated frames, beginning with nothing (Oreshkin et al. 2022);
             learned positions count frames from the key before and to the key after, not from the start (Qin
-            et al. 2022 tell the distance to keys likewise); layers are normalised before, not after.
+            et al. 2022 tell the distance to keys likewise); layers are normalised before, not after, and
+            the network sees standardised numbers.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -67,15 +68,26 @@ class Encoder(nn.Module):
         self.layers = nn.TransformerEncoder(layer, config.layers, norm, enable_nested_tensor=False)
         self.last = nn.Linear(WIDTH, WIDTH)
         if self.residual:
+            self.register_buffer("mean", torch.zeros(WIDTH))
+            self.register_buffer("std", torch.ones(WIDTH))
+            self.first = nn.Linear(WIDTH, WIDTH)
             nn.init.zeros_(self.last.weight)
             nn.init.zeros_(self.last.bias)
 
     def forward(self, frames: Tensor, keys: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
         """Frames (B, T, 154), keys (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
         token = self.label(label)[:, None]
-        deep = self.layers(torch.cat([token, frames + self._places(keys)], dim=1))
+        seen = self.first((frames - self.mean) / self.std) if self.residual else frames
+        deep = self.layers(torch.cat([token, seen + self._places(keys)], dim=1))
         said = self.last(deep[:, 1:])
-        return deep[:, 0], frames + said if self.residual else said
+        return deep[:, 0], frames + self.std * said if self.residual else said
+
+    @torch.no_grad()
+    def standardise(self, frames: Tensor) -> None:
+        """Take mean and deviation of what the network sees from frames (n, 154)."""
+        self.mean.copy_(frames.mean(dim=0))
+        # What hardly moves (a twist that no joint has) must not become all there is to see.
+        self.std.copy_(frames.std(dim=0).clamp(min=0.02))
 
     def _places(self, keys: Tensor) -> Tensor:
         """Learned positions, (B, T, 154) or (T, 154)."""

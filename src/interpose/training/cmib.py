@@ -58,6 +58,17 @@ def draw_keys(rng: np.random.Generator, settings: CmibSettings, batch: int, leng
     return keys
 
 
+@torch.no_grad()
+def sample_frames(model: Cmib, poses: Poses, settings: CmibSettings) -> Tensor:
+    """(n, 154) interpolated frames as the network will see them: the same for all processes."""
+    rng, seen = np.random.default_rng(settings.seed), []
+    for _ in range(20):
+        drawn = poses.draw(rng, 32, draw_length(rng, settings))
+        keys = torch.from_numpy(draw_keys(rng, settings, *drawn.rotation.shape[:2])).to(poses.device)
+        seen.append(model.prepare(drawn.positions(), drawn.rotation, keys)[0].flatten(0, 1))
+    return torch.cat(seen)
+
+
 class Losses:
     """Equations 15 to 18, in the frame of the first key.
 
@@ -112,6 +123,8 @@ def train_cmib(
     model = Cmib(CmibConfig(labels)).to(device)
     if start:
         restore(model, start.onnx)
+    elif model.config.residual:
+        model.encoder.standardise(sample_frames(model, poses, settings))
     losses = Losses(model, settings)
     moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)
     batch = max(1, settings.batch // processes())
