@@ -26,11 +26,15 @@ def _rigs() -> list[dict[str, Any]]:
 
 
 def directions(skeleton: Skeleton) -> np.ndarray:
-    """(J, 3) where bones point in the zero pose; 0 for those that have no length."""
+    """(J, 3) where bones point in the zero pose; 0 for those that have no length, and for the only one below
+    a root, which says where the body stands."""
     bones = skeleton.rest_translation * skeleton.scale_above[:, None]
     _, placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)
     above = [max(parent, 0) for parent in skeleton.parents]
     away = placed - placed[above]
+    for root in skeleton.roots:
+        if len(skeleton.children[root]) == 1:
+            away[skeleton.children[root][0]] = 0.0
     length = np.linalg.norm(away, axis=1, keepdims=True)
     return np.where(length > LEAST, away / np.maximum(length, LEAST), 0.0)
 
