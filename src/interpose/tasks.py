@@ -26,6 +26,9 @@ from interpose.skeletons import find_humanoid
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
+STANDS = 0.4  # metres a second: who is slower does not go anywhere
+PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
+TURN = 180.0  # degrees a second: an unhurried turn of a joint
 
 
 @dataclass(frozen=True)
@@ -171,6 +174,30 @@ def between(
             "Name two or more that are apart: 0,30,75.",
         )
     return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
+
+
+def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[int, str]:
+    """How many frames a motion takes from frame `last` of one clip to frame `first` of another, and why.
+
+    As long as the hips need for the way at the pace of the two clips (of the second beside the pose; people
+    who stand set off at PACE), or, if that is longer, as the joint that has furthest to turn needs at TURN.
+    """
+    fps = start.fps
+    here, there = start.root[last], target.root[first]
+    way = float(np.linalg.norm((there - here)[[0, 2]]))
+    paces = []
+    for clip, frame in ((start, last), (target, first)):
+        lo, hi = max(0, frame - round(clip.fps)), min(len(clip), frame + round(clip.fps) + 1)
+        steps = np.linalg.norm(np.diff(clip.root[lo:hi, [0, 2]], axis=0), axis=1) * clip.fps
+        paces.append(float(steps.mean()) if len(steps) else 0.0)
+    pace = max(paces) if max(paces) > STANDS else PACE
+    turns = np.degrees(rotations.angle(start.rotation[last], target.rotation[first]))
+    joint = int(turns.argmax())
+    by_way, by_turn = way / pace, float(turns[joint]) / TURN
+    count = max(1, round(max(by_way, by_turn) * fps) - 1)
+    if by_way >= by_turn:
+        return count, f"{way:.2f} m at {pace:.1f} m/s"
+    return count, f"{start.skeleton.names[joint]} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"
 
 
 def block(poses: Mapping[int, Clip]) -> Clip:

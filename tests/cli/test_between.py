@@ -56,6 +56,19 @@ def test_poses_of_several_files(run, take):
         assert np.array_equal(made.translation[frame], source.translation[was])
 
 
+def test_a_length_is_proposed_with_its_reason(run, take):
+    """As long as the walk itself took for the way, about."""
+    done = run(
+        "between", "--start", "take.bvh#20", "--target", "take.bvh#80", "--frames", "auto", "-o", "a.bvh"
+    )
+    assert done.code == 0
+    assert "m/s" in done.out
+    assert 40 <= len(load(take.with_name("a.bvh"))) - 2 <= 80
+    same = ("between", "--start", "take.bvh#20", "--target", "take.bvh#20", "--frames", "auto", "-o", "b.bvh")
+    assert run(*same).code == 0
+    assert len(load(take.with_name("b.bvh"))) == 3
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

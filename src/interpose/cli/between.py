@@ -23,7 +23,7 @@ def between(
     keys: list[str] = [],  # noqa: B006
     start: str | None = None,
     target: str | None = None,
-    frames: int | None = None,
+    frames: str | None = None,
     anchor: list[str] = [],  # noqa: B006
     action: str = "",
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
@@ -53,7 +53,7 @@ def between(
         keys: the frames of the file that are keys, separated by commas, counted from 0.
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
-        frames: how many frames to generate between --start and --target.
+        frames: how many frames to generate between --start and --target; auto proposes a number.
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
         action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
@@ -68,10 +68,11 @@ def between(
     from interpose.cli.request import check_method
 
     check_method(method)
+    said = ""
     if file is not None and not (start or target or frames or anchor):
         chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
     elif file is None and not keys and start and target and frames is not None:
-        file, chosen, clip = _blocked(start, target, frames, anchor, reading)
+        file, chosen, clip, said = _blocked(start, target, frames, anchor, reading)
     else:
         raise RequestError(
             "it is not clear what the keys are",
@@ -82,7 +83,7 @@ def between(
     outputs.check(file, force)
     with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
         done = tasks.between(clip, chosen, action, method, seed, advance)
-    return finish("between", file, outputs, clip, done, seed, {}, json=json, force=force)
+    return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force)
 
 
 def _frame(text: str) -> int:
@@ -92,26 +93,37 @@ def _frame(text: str) -> int:
 
 
 def _blocked(
-    start: str, target: str, frames: int, anchors: list[str], reading: Reading
-) -> tuple[Path, list[int], Clip]:
-    """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip."""
+    start: str, target: str, frames: str, anchors: list[str], reading: Reading
+) -> tuple[Path, list[int], Clip, str]:
+    """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip, and
+    a line for the user where the length was proposed."""
     from interpose import tasks
 
-    if frames < 1:
-        raise RequestError(f"cannot generate {frames} frames", "it takes 1 or more", "Write --frames 45.")
-    file, first = _pose(start, -1, reading)
-    poses = {0: first, frames + 1: _pose(target, 0, reading)[1]}
+    file, before, last = _pose(start, -1, reading)
+    _, after, first = _pose(target, 0, reading)
+    said = ""
+    if frames == "auto":
+        count, why = tasks.plausible_length(before, last, after, first)
+        said = f"{count} frames: {why}"
+    elif frames.isdecimal() and int(frames) > 0:
+        count = int(frames)
+    else:
+        raise RequestError(
+            f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
+        )
+    poses = {0: _frame_of(before, last), count + 1: _frame_of(after, first)}
     for text in anchors:
         what, _, at = text.rpartition("@")
-        if not what or not at.isdecimal() or not 0 < int(at) <= frames:
-            why = f"it is FILE@AT, with AT from 1 to {frames}"
+        if not what or not at.isdecimal() or not 0 < int(at) <= count:
+            why = f"it is FILE@AT, with AT from 1 to {count}"
             raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
-        poses[int(at)] = _pose(what, 0, reading)[1]
-    return file, sorted(poses), tasks.block(poses)
+        _, clip, frame = _pose(what, 0, reading)
+        poses[int(at)] = _frame_of(clip, frame)
+    return file, sorted(poses), tasks.block(poses), said
 
 
-def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip]:
-    """FILE or FILE#FRAME: the file, and the pose as a clip of one frame."""
+def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip, int]:
+    """FILE or FILE#FRAME: the file, its clip, and the frame meant."""
     name, _, frame = text.rpartition("#")
     file, number = (Path(name), int(frame)) if name and frame.isdecimal() else (Path(text), None)
     clip = reading.load(file)
@@ -120,5 +132,10 @@ def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip]:
     if number >= len(clip):
         why = f"the clip has {len(clip)} frames, counted from 0"
         raise RequestError(f"there is no frame {number} in {file}", why, f"Choose up to {len(clip) - 1}.")
-    part = slice(number, number + 1)
-    return file, clip.with_motion(clip.rotation[part], clip.translation[part])
+    return file, clip, number
+
+
+def _frame_of(clip: Clip, frame: int) -> Clip:
+    """One frame, with the file's layout."""
+    part = slice(frame, frame + 1)
+    return clip.with_motion(clip.rotation[part], clip.translation[part])
