@@ -74,3 +74,13 @@ def test_the_motion_turns_with_the_clip_and_the_action_matters(cmu_walk):
     assert np.abs(rotations.rotate(turn, done) - other).max() < 5e-3
     jump = tasks.between(cmu_walk, keys, "ground").clip.positions()
     assert np.abs(jump - done)[21:50].max() > 1e-3
+
+
+@trained
+def test_keys_that_contradict_the_action_are_told(cmu_walk):
+    """The same walk, four times as far in the same time: nobody walks so."""
+    far = cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation * [4.0, 1.0, 4.0])
+    usual, odd = (tasks.between(clip, (20, 50), "walk").report.gaps[0].notes for clip in (cmu_walk, far))
+    assert not any("contradict" in note for note in usual)
+    assert any("contradict" in note for note in odd)
+    assert not any("contradict" in note for note in tasks.between(far, (20, 50)).report.gaps[0].notes)

@@ -439,7 +439,10 @@ def _report(
         foot_slide_before=unheld[0] if unheld else None,
         foot_travel=held[1] if held else None,
         drift=_centi(_drift(raw.notes, gap)) if own else None,
-        notes=tuple(span.notes),
+        notes=(
+            *span.notes,
+            *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
+        ),
     )
 
 

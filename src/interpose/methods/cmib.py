@@ -112,7 +112,7 @@ class Cmib:
         turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
         placed = canonical_positions(turned, root, bones)
         label, lengths = card.labels.index(self.action), np.linalg.norm(bones, axis=-1)
-        step = clip.fps / card.fps
+        step, remarks = clip.fps / card.fps, {}
         for keys in passes(observation.frames, (card.max_gap + 1) * step + 1):
             first, last = keys[0], keys[-1]
             # Both ends lie on the network's grid; its frames may be a little longer or shorter for that.
@@ -124,9 +124,26 @@ class Cmib:
             rotation = np.tile([1.0, 0.0, 0.0, 0.0], (count, turned.shape[1], 1))
             known[slots], positions[slots], rotation[slots] = True, placed[keys], turned[keys]
             hips, said = run(card.onnx, positions, rotation, known, label, lengths)
+            for a, b in zip(keys, keys[1:]):
+                if remark := self._odd(root[a], root[b], (b - a) / clip.fps):
+                    remarks[f"{a + 1}:{b}"] = [remark]
             inside = np.setdiff1d(np.arange(first, last), keys)
             back = (inside - first) * scale
             root[inside] = sample_smooth(hips, back)
             turned[inside] = sample_rotations_smooth(rotations.continuous(said), back)
         done = body.to_clip(turned, root / body.scale, base)
-        return Raw(done, notes={"model": card.name, "action": self.action})
+        return Raw(done, notes={"model": card.name, "remarks": remarks})
+
+    def _odd(self, here: np.ndarray, there: np.ndarray, seconds: float) -> str | None:
+        """How two keys contradict the action, if they do: by the pace that they ask for (figure 9).
+
+        Only keys within two seconds tell: in longer times people turn around.
+        """
+        if self.action not in self.card.paces or seconds > 2.0:
+            return None
+        low, high = self.card.paces[self.action]
+        pace = float(np.linalg.norm((there - here)[[0, 2]])) / seconds
+        if low <= pace <= high:
+            return None
+        usual = f"{self.action} in the training data keeps between {low:.1f} and {high:.1f}"
+        return f"the keys ask for {pace:.1f} m/s, and {usual}: they contradict the action"

@@ -32,6 +32,8 @@ class Card:
         metrics: measured figures with the command that printed them.
         auto: what the method `auto` goes by: from `from_gap` frames on the network is better than the spline.
         labels: action labels that it understands, in its own order; the first is "", for none.
+        paces: for a label how fast the hips get ahead in its training motion, over a second: the 2nd and the
+            98th percentile in metres a second, on a body with the canonical leg.
     """
 
     name: str
@@ -47,6 +49,7 @@ class Card:
     metrics: dict[str, Any] = field(default_factory=dict)
     auto: dict[str, Any] = field(default_factory=dict)
     labels: list[str] = field(default_factory=list)
+    paces: dict[str, list[float]] = field(default_factory=dict)
     path: Path = field(default=Path(), compare=False)
 
     @property
