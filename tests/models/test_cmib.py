@@ -17,6 +17,8 @@ from interpose.models.cmib import WIDTH, Cmib, CmibConfig, between_keys, restore
 from interpose.skeletons import PARENTS, find_humanoid  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cmib import CmibSettings, Losses, draw_keys, train_cmib  # noqa: E402
+from interpose.training.export import export_cmib_onnx  # noqa: E402
+from interpose.training.loop import restore  # noqa: E402
 from interpose.training.poses import Batch, Poses, labels_of, new_path, random_path  # noqa: E402
 
 
@@ -233,3 +235,32 @@ def test_training_learns_writes_figures_and_goes_on(pack, tmp_path):
     assert any("goes on at 60 %" in line for line in lines)
     config = json.loads((tmp_path / "settings.json").read_text())["config"]
     assert config["labels"] == ["", "walk"]
+
+
+def test_the_graph_agrees_with_torch_at_other_sizes_and_training_goes_on_from_it(batch, tmp_path):
+    """Exported at 40 frames and two clips, run at 33 frames and one; weights come back within 16 bits."""
+    import onnxruntime
+
+    torch.manual_seed(2)
+    config = CmibConfig(("", "walk"), layers=2, inner=64)
+    model = Cmib(config).eval()
+    torch.nn.init.normal_(model.encoder.last.weight, std=0.05)
+    path = tmp_path / "cmib.onnx"
+    export_cmib_onnx(model, path)
+    again = Cmib(config).eval()
+    restore(again, path)
+    for name, value in model.state_dict().items():
+        assert torch.allclose(again.state_dict()[name], value, rtol=1e-3, atol=1e-3), name
+    short = Batch(batch.rotation[:1, :33], batch.root[:1, :33], batch.bones[:1], batch.label[:1])
+    keys = keys_at(short, 0, 11, 32)
+    feed = {
+        "positions": short.positions().numpy(),
+        "rotation": short.rotation.numpy(),
+        "keys": keys.numpy(),
+        "label": short.label.numpy(),
+        "bones": short.bones.norm(dim=-1).numpy(),
+    }
+    placed, turned = onnxruntime.InferenceSession(str(path)).run(None, feed)
+    expected, expected_turned = run(again, short, keys)
+    assert np.abs(placed - expected.numpy()).max() < 1e-3
+    assert rotations.angle(torch.from_numpy(turned), expected_turned).max() < 5e-3

@@ -73,6 +73,7 @@ def _write_graph(
         output_names=outputs,
         dynamic_shapes=tuple(sizes for _, sizes in inputs.values()),
         verbose=False,
+        optimize=False,  # keeps weights under their names, so that training can start from them
     )
     graph = program.model_proto
     _strip(graph)
