@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.errors import unknown
@@ -20,6 +21,9 @@ from interpose.skeletons import find_mapping
 from interpose.skeletons.humanoid import canonical_positions
 
 ANCHORS = 3  # at most, as in training
+# Frames (standard deviation) over which its motion is smoothed: frame by frame the network trembles. On the
+# validation performer (60 frames, two keys) L2P falls from 2.83 to 2.82, and no further with 2 frames.
+SMOOTH = 1.0
 
 
 def passes(complete: np.ndarray, longest: float) -> list[list[int]]:
@@ -127,10 +131,12 @@ class Cmib:
             for a, b in zip(keys, keys[1:]):
                 if remark := self._odd(root[a], root[b], (b - a) / clip.fps):
                     remarks[f"{a + 1}:{b}"] = [remark]
+            said = rotations.continuous(said)
+            hips, said = (ndimage.gaussian_filter1d(v, SMOOTH, axis=0, mode="nearest") for v in (hips, said))
             inside = np.setdiff1d(np.arange(first, last), keys)
             back = (inside - first) * scale
             root[inside] = sample_smooth(hips, back)
-            turned[inside] = sample_rotations_smooth(rotations.continuous(said), back)
+            turned[inside] = sample_rotations_smooth(rotations.normalize(said), back)
         done = body.to_clip(turned, root / body.scale, base)
         return Raw(done, notes={"model": card.name, "remarks": remarks})
 
