@@ -29,7 +29,8 @@ def test_keys_come_back_and_the_rest_is_new(run, take):
 @pytest.mark.skipif(not TRAINED, reason="no weights of cmib")
 def test_an_action_asks_for_cmib_and_is_replayed(run, take):
     done = run("between", "take.bvh", "--keys", "10,40,90", "--action", "walk", "--json")
-    assert {gap["method"] for gap in done.json["gaps"]} == {"cmib"}
+    assert done.json["method"] == "auto"
+    assert "cmib" in {gap["method"] for gap in done.json["gaps"]}
     assert done.json["action"] == "walk"
     again = run("fill", "take.bvh", "--gaps", "take.between.json", "-o", "again.bvh")
     assert again.code == 0
