@@ -8,9 +8,6 @@ import numpy as np
 import pytest
 
 from interpose.formats import load
-from interpose.methods import weights
-
-TRAINED = any(card.method == "cmib" for card in weights.cards())
 
 
 def test_keys_come_back_and_the_rest_is_new(run, take):
@@ -26,7 +23,6 @@ def test_keys_come_back_and_the_rest_is_new(run, take):
     assert report["verb"] == "between"
 
 
-@pytest.mark.skipif(not TRAINED, reason="no weights of cmib")
 def test_an_action_asks_for_cmib_and_is_replayed(run, take):
     done = run("between", "take.bvh", "--keys", "10,40,90", "--action", "walk", "--json")
     assert done.json["method"] == "auto"
@@ -38,7 +34,6 @@ def test_an_action_asks_for_cmib_and_is_replayed(run, take):
     assert first == second
 
 
-@pytest.mark.skipif(not TRAINED, reason="no weights of cmib")
 def test_an_unknown_action_is_refused_with_the_choices(run, take):
     done = run("between", "take.bvh", "--keys", "10,40", "--action", "wlk")
     assert done.code == 2

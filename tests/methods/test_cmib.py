@@ -8,13 +8,9 @@ import pytest
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.methods import registry, weights
+from interpose.methods import registry
 from interpose.methods.cmib import passes
 from interpose.observation import Gap, Observation
-
-trained = pytest.mark.skipif(
-    not any(card.method == "cmib" for card in weights.cards()), reason="no weights of cmib"
-)
 
 
 def keys_of(text: str, longest: float = 131) -> list[list[int]]:
@@ -40,7 +36,6 @@ def test_methods_without_actions_say_so():
         registry.told("spline", "walk")
 
 
-@trained
 def test_it_refuses_what_it_cannot_do(cmu_walk):
     method, last = registry.get("cmib"), len(cmu_walk)
     for gap, why in (
@@ -52,7 +47,6 @@ def test_it_refuses_what_it_cannot_do(cmu_walk):
     assert method.refuses(cmu_walk, Gap(3, 9)) is None
 
 
-@trained
 def test_raw_motion_meets_the_keys(cmu_walk):
     seen = Observation.from_gaps(cmu_walk, [Gap(11, 40), Gap(41, 80)])
     raw = registry.get("cmib").complete(cmu_walk, seen)
@@ -62,7 +56,6 @@ def test_raw_motion_meets_the_keys(cmu_walk):
     assert beside.max() < 0.1
 
 
-@trained
 def test_the_motion_turns_with_the_clip_and_the_action_matters(cmu_walk):
     turn = rotations.about("Y", np.array(2.0))
     rotation = cmu_walk.rotation.copy()
@@ -77,7 +70,6 @@ def test_the_motion_turns_with_the_clip_and_the_action_matters(cmu_walk):
     assert np.abs(said[0].positions() - said[1].positions())[21:50].max() > 1e-4
 
 
-@trained
 def test_keys_that_contradict_the_action_are_told(cmu_walk):
     """The same walk, four times as far in the same time: nobody walks so."""
     far = cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation * [4.0, 1.0, 4.0])
