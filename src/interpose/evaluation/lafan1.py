@@ -243,6 +243,7 @@ class Row:
     travel: float | None = None
     pop: float | None = None
     bones: float | None = None
+    fell_back: float | None = None
 
 
 @dataclass
@@ -250,8 +251,8 @@ class Lafan1:
     """The figures: `rows[method][gap]`.
 
     l2p, l2q, npss as published; degrees by which global rotations are off; milliseconds a clip; of finished
-    fills also slide (cm/s) and travel (m) of the feet, the velocity jump at the keys (cm/frame^2), and by how
-    much bones change (cm).
+    fills also slide (cm/s) and travel (m) of the feet, the velocity jump at the keys (cm/frame^2), by how
+    much bones change (cm), and the share of fills that are the spline's, because the method's own did not do.
     """
 
     name: str
@@ -301,7 +302,7 @@ class Lafan1:
             figures = [f"{row.degrees:.1f} deg", f"{row.milliseconds:.1f} ms"]
             if row.slide is not None:
                 figures += [f"feet {row.slide:.1f} cm/s {row.travel:.2f} m", f"pop {row.pop:.2f}"]
-                figures += [f"bones {row.bones:.2f} cm"]
+                figures += [f"bones {row.bones:.2f} cm", f"{100 * (row.fell_back or 0):.0f} % fell back"]
             return "; ".join(figures)
 
         return self._markdown("", cell)
@@ -328,7 +329,7 @@ class Lafan1:
                 f"in brackets the ratio to {self.protocol.base}.",
                 *(self.table(figure, digits) for figure, digits in (("l2p", 4), ("l2q", 4), ("npss", 5))),
                 "Global rotations off in degrees; time a clip; of finished fills foot slide and travel, "
-                "velocity jump at keys (cm/frame^2), change of bone lengths:",
+                "velocity jump at keys (cm/frame^2), change of bones, share that fell back to the spline:",
                 self.extras(),
             ]
         )
@@ -393,10 +394,10 @@ def measure(held: Data, rules: Protocol, windows: Windows, gap: int, name: str, 
         rotation, root = windows.rotation[:, part].copy(), windows.root[:, part].copy()
         first, last = (frame - part.start for frame in rules.hidden(gap))
         for i, clip in enumerate(_clips(held, rules, windows, gap)):
-            done, missing = fill(clip, rules, gap, name, finished)
+            done, missing, fell_back = fill(clip, rules, gap, name, finished)
             rotation[i, first:last], root[i, first:last] = done.rotation[missing], done.root[missing]
             if finished:
-                extra.append(_extra(done, missing))
+                extra.append((*_extra(done, missing), fell_back))
         before = windows.rotation[:, part.start - 1] if first == 0 else rotation[:, 0]
         turned, placed = forward(resign(rotation, before), root, windows.bones)
     spent = 1000 * (time.perf_counter() - start) / len(windows)
@@ -421,14 +422,16 @@ def _global_lines(turned: np.ndarray, placed: np.ndarray) -> tuple[np.ndarray, n
     return rotations.slerp(turned[:, :1], turned[:, -1:], share), lines
 
 
-def fill(clip: Clip, rules: Protocol, gap: int, name: str, finished: bool) -> tuple[Clip, slice]:
-    """A clip completed by a method, `finished` with all guarantees; and which frames were missing."""
+def fill(clip: Clip, rules: Protocol, gap: int, name: str, finished: bool) -> tuple[Clip, slice, bool]:
+    """A clip completed by a method, `finished` with all guarantees; which frames were missing; and whether
+    it fell back to a simpler method there."""
     start, stop = (frame - rules.shown(gap).start for frame in rules.hidden(gap))
     seen = Observation.from_gaps(clip, [Gap(start, stop)])
     method = registry.get(name)
     if finished:
-        return complete(clip, seen, method).clip, slice(start, stop)
-    return method.complete(wipe(clip, seen), seen).clip, slice(start, stop)
+        done = complete(clip, seen, method)
+        return done.clip, slice(start, stop), any(one.method != name for one in done.report.gaps)
+    return method.complete(wipe(clip, seen), seen).clip, slice(start, stop), False
 
 
 def _clips(held: Data, rules: Protocol, windows: Windows, gap: int) -> Iterator[Clip]:
