@@ -44,6 +44,7 @@ class Protocol:
         keys_count: whether a length counts the two key frames, which are judged, too.
         context: frames that are known before the gap.
         leaves: whether the rotations of leaf joints are judged; else they are taken for none.
+        told: whether methods that know actions are told the sequence's theme.
         base: the row that all ratios are to.
     """
 
@@ -52,6 +53,7 @@ class Protocol:
     keys_count: bool
     context: int
     leaves: bool
+    told: bool
     base: str
 
     def window(self, gap: int) -> int:
@@ -76,8 +78,8 @@ class Protocol:
 
 
 PROTOCOLS = {
-    "official": Protocol("official", (5, 15, 30, 45), False, PAST, True, "linear"),
-    "cmib": Protocol("cmib", (30, 40, 60, 80, 120), True, 1, False, "linear, global"),
+    "official": Protocol("official", (5, 15, 30, 45), False, PAST, True, False, "linear"),
+    "cmib": Protocol("cmib", (30, 40, 60, 80, 120), True, 1, False, True, "linear, global"),
 }
 
 

@@ -108,14 +108,19 @@ def angle(a: Array, b: Array) -> Array:
     return xp.where(same, square, xp.sqrt(xp.where(same, xp.ones_like(square), square)))
 
 
+def alike(q: Array, other: Array) -> Array:
+    """The same rotations `q` (..., 4), each with the sign that brings it nearer to the other quaternion."""
+    xp = array_namespace(q, other)
+    return xp.where(xp.sum(q * other, axis=-1, keepdims=True) < 0, -q, q)
+
+
 def slerp(a: Array, b: Array, t: Array) -> Array:
     """From `a` to `b` (..., 4) along the short way; `t` (...) is 0 at `a` and 1 at `b`.
 
     Source: Shoemake, Animating Rotation with Quaternion Curves, 1985.
     """
     xp = array_namespace(a, b)
-    cosine = xp.sum(a * b, axis=-1, keepdims=True)
-    b = xp.where(cosine < 0, -b, b)
+    b = alike(b, a)
     t = xp.asarray(t, dtype=a.dtype) if not hasattr(t, "dtype") else t
     return normalize(multiply(a, exp(t[..., None] * log(multiply(conjugate(a), b)))))
 

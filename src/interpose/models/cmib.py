@@ -31,9 +31,10 @@ class CmibConfig:
         longest: frames, keys included.
         residual: what later work found to train faster, and False for the paper's own network. The network
             says what to add to the interpolated frames, beginning with nothing (Oreshkin et al. 2022);
-            learned positions count frames from the key before and to the key after, not from the start (Qin
-            et al. 2022 tell the distance to keys likewise); layers are normalised before, not after, and
-            the network sees standardised numbers.
+            learned positions count frames from the key before and to the key after, not from the start, and
+            how much two frames attend to each other has a learned part for how far apart they are (Qin et
+            al. 2022, both); layers are normalised before, not after, and the network sees standardised
+            numbers.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -71,6 +72,7 @@ class Encoder(nn.Module):
             self.register_buffer("mean", torch.zeros(WIDTH))
             self.register_buffer("std", torch.ones(WIDTH))
             self.first = nn.Linear(WIDTH, WIDTH)
+            self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1))
             nn.init.zeros_(self.last.weight)
             nn.init.zeros_(self.last.bias)
 
@@ -78,7 +80,7 @@ class Encoder(nn.Module):
         """Frames (B, T, 154), keys (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
         token = self.label(label)[:, None]
         seen = self.first((frames - self.mean) / self.std) if self.residual else frames
-        deep = self.layers(torch.cat([token, seen + self._places(keys)], dim=1))
+        deep = self.layers(torch.cat([token, seen + self._places(keys)], dim=1), mask=self._bias(keys))
         said = self.last(deep[:, 1:])
         return deep[:, 0], frames + self.std * said if self.residual else said
 
@@ -96,6 +98,15 @@ class Encoder(nn.Module):
         last, first = neighbours(keys)
         frame = torch.arange(keys.shape[1], device=keys.device)
         return self.place[0][(frame - last).clamp(min=0)] + self.place[1][(first - frame).clamp(min=0)]
+
+    def _bias(self, keys: Tensor) -> Tensor | None:
+        """What is added to the attention between frames, (B * heads, 1 + T, 1 + T); nothing for the token."""
+        if not self.residual:
+            return None
+        batch, count = keys.shape
+        frame = torch.arange(count, device=keys.device)
+        bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
+        return nn.functional.pad(bias, (1, 0, 1, 0)).repeat(batch, 1, 1)
 
 
 def between_keys(values: Tensor, keys: Tensor) -> Tensor:
@@ -160,16 +171,13 @@ class Cmib(nn.Module):
         positions = turn(positions - origin[:, None, None], -yaw[:, None, None])
         rotation = rotations.multiply(rotations.about("Y", -yaw)[:, None, None], rotation)
         # Of the two quaternions of the first key the one with a positive real part; the others follow it.
-        rotation = self._follow(rotation, pick(rotation.flatten(2), start).unflatten(2, (len(JOINTS), 4)))
+        begin = pick(rotation.flatten(2), start).unflatten(2, (len(JOINTS), 4))
+        begin = torch.where(begin[..., :1] < 0, -begin, begin)
+        rotation = rotations.alike(rotation, begin)
         frames = torch.cat(
             [between_keys(positions, keys).flatten(2), between_keys(rotation, keys).flatten(2)], dim=2
         )
         return frames, origin, yaw
-
-    @staticmethod
-    def _follow(rotation: Tensor, first: Tensor) -> Tensor:
-        first = torch.where(first[..., :1] < 0, -first, first)
-        return torch.where((rotation * first).sum(-1, keepdim=True) < 0, -rotation, rotation)
 
     def forward(
         self, positions: Tensor, rotation: Tensor, keys: Tensor, label: Tensor, bones: Tensor

@@ -66,13 +66,18 @@ def commit() -> str:
 
 
 def restore(model: nn.Module, path: Path) -> None:
-    """Fill a model with the weights that an exported graph holds (16 bits of them, where they are large)."""
+    """Fill a model with the weights that an exported graph holds (16 bits of them, where they are large).
+
+    A part that begins with nothing may be missing: without it the network is the one that was exported.
+    """
     import onnx
     from onnx import numpy_helper
 
     held = {one.name.removesuffix(".half"): one for one in onnx.load(path).graph.initializer}
     with torch.no_grad():
         for name, value in model.state_dict().items():
+            if name not in held and not value.any():
+                continue
             if name not in held or list(held[name].dims) != list(value.shape):
                 raise FileError(
                     f"cannot start from {path.name}",
