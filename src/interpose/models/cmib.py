@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor, nn
+from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
@@ -80,7 +81,10 @@ class Encoder(nn.Module):
         """Frames (B, T, 154), keys (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
         token = self.label(label)[:, None]
         seen = self.first((frames - self.mean) / self.std) if self.residual else frames
-        deep = self.layers(torch.cat([token, seen + self._places(keys)], dim=1), mask=self._bias(keys))
+        deep = torch.cat([token, seen + self._places(keys)], dim=1)
+        # PyTorch's fused attention takes several times as long backwards on a CPU.
+        with sdpa_kernel(SDPBackend.MATH):
+            deep = self.layers(deep, mask=self._bias(keys))
         said = self.last(deep[:, 1:])
         return deep[:, 0], frames + self.std * said if self.residual else said
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor, nn
-from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.datasets import Pack
 from interpose.geometry import rotations
@@ -90,12 +88,7 @@ class Losses:
         # The truth in the frame of the keys: its origin is that of the ends, which are keys, too.
         truth, _, _ = self.model.prepare(positions, batch.rotation, torch.ones_like(keys))
         true = truth[..., :POSITIONS]
-        # PyTorch's fused attention takes several times as long backwards on a CPU.
-        cpu = frames.device.type == "cpu"
-        with (
-            sdpa_kernel(SDPBackend.MATH) if cpu else nullcontext(),
-            torch.autocast(frames.device.type, torch.bfloat16),
-        ):
+        with torch.autocast(frames.device.type, torch.bfloat16):
             token, out = self.model.encoder(frames, keys, batch.label)
         out, label = out.float(), self.model.encoder.label(batch.label)
         turned = rotations_of(out)

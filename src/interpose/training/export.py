@@ -12,6 +12,7 @@ import numpy as np
 import onnx
 import torch
 from onnx import TensorProto, helper, numpy_helper
+from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.datasets import DATASETS, Pack
 from interpose.methods.weights import Card
@@ -65,16 +66,18 @@ def _write_graph(
 
     Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits.
     """
-    program = torch.onnx.export(
-        model.eval().cpu(),
-        tuple(example for example, _ in inputs.values()),
-        dynamo=True,
-        input_names=list(inputs),
-        output_names=outputs,
-        dynamic_shapes=tuple(sizes for _, sizes in inputs.values()),
-        verbose=False,
-        optimize=False,  # keeps weights under their names, so that training can start from them
-    )
+    # The exporter stumbles over the memory layout of fused attention with a bias.
+    with sdpa_kernel(SDPBackend.MATH):
+        program = torch.onnx.export(
+            model.eval().cpu(),
+            tuple(example for example, _ in inputs.values()),
+            dynamo=True,
+            input_names=list(inputs),
+            output_names=outputs,
+            dynamic_shapes=tuple(sizes for _, sizes in inputs.values()),
+            verbose=False,
+            optimize=False,  # keeps weights under their names, so that training can start from them
+        )
     graph = program.model_proto
     _strip(graph)
     _halve(graph)
