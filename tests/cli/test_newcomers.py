@@ -165,6 +165,16 @@ def test_without_torch_the_error_names_the_extra(run, monkeypatch, command):
     assert len(done.err.splitlines()) == 3
 
 
+def test_settings_of_a_recipe_are_changed_by_name(run):
+    pytest.importorskip("torch")
+    done = run("train", "cmib", "--out", "x", "--set", "augment=0")
+    assert done.code == 2
+    assert "unknown setting: augment" in done.err
+    assert "Did you mean augmented" in done.err
+    done = run("train", "cmib", "--out", "x", "--set", "augmented=0", "--set", "batch=many")
+    assert "cannot set batch to 'many'" in done.err
+
+
 def test_networks_are_not_trained_on_test_performers(run, tmp_path):
     pytest.importorskip("torch")
     done = run("train", "cae", "--out", "x", "--splits", "train,test")

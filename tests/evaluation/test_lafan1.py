@@ -5,38 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interpose import formats
-from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.evaluation import lafan1
 from interpose.evaluation.lafan1 import PROTOCOLS, cut, forward, l2p, l2q, npss, resign
-from interpose.geometry import kinematics, rotations
-from interpose.skeletons import BONES, JOINTS, PARENTS, find_humanoid
-
-# The axes of LAFAN1's joints in the T-pose: X up, Y ahead, Z to the left.
-AXES = rotations.from_matrix(np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]]))
-
-
-@pytest.fixture(scope="module")
-def sequence(cmu_walk):  # type: ignore[no-untyped-def]
-    """A real walk on a skeleton with LAFAN1's joints and axes, there and back again."""
-    turned = rotations.multiply(find_humanoid(cmu_walk).rotations(cmu_walk), AXES)
-    bones = rotations.rotate(rotations.conjugate(AXES), BONES)
-    order = np.concatenate([np.arange(209), np.arange(209)[::-1]])
-    local = kinematics.local_rotations(turned, PARENTS)[order]
-    skeleton = Skeleton(JOINTS, PARENTS, bones)
-    return Clip(skeleton, local, cmu_walk.root[order, None], 30.0, name="walk1_subject4")
-
-
-@pytest.fixture(scope="module")
-def published(sequence, tmp_path_factory):  # type: ignore[no-untyped-def]
-    """The published layout: subjects 1, 4 and 5 with a sequence each, and a cut that only trains."""
-    folder = tmp_path_factory.mktemp("data")
-    for name in ("bvh/walk1_subject1", "bvh/run1_subject4", "bvh/jumps1_subject5", "cuts/fight1_subject2_a"):
-        path = folder / "lafan1" / f"{name}.bvh"
-        path.parent.mkdir(parents=True, exist_ok=True)
-        formats.save(sequence, path)
-    return folder
+from interpose.geometry import rotations
+from interpose.methods import registry
 
 
 def test_windows_are_cut_centred_and_turned_as_the_authors_do(sequence):
@@ -95,7 +68,7 @@ def test_interpolation_is_the_authors(published):
     """LERP of the hips and SLERP of local rotations with weights linspace(0, 1, gap + 2)."""
     held = lafan1.load(published, "validation")
     windows = cut(held.sequences, 65, 40, held.bones)
-    row = lafan1.measure(held, PROTOCOLS["official"], windows, 15, "linear", False)
+    row = lafan1.measure(held, PROTOCOLS["official"], windows, 15, registry.get("linear"), False)
     share = np.linspace(0, 1, 17)[1:-1]
     root = windows.root[:, 9:10] + share[None, :, None] * (windows.root[:, 25:26] - windows.root[:, 9:10])
     local = rotations.slerp(windows.rotation[:, 9:10], windows.rotation[:, 25:26], share[None, :, None])
@@ -108,10 +81,10 @@ def test_interpolation_is_the_authors(published):
 def test_the_truth_itself_scores_zero(published, protocol, monkeypatch):
     held, rules = lafan1.load(published, "validation"), PROTOCOLS[protocol]
     windows = cut(held.sequences, rules.window(30), 40, held.bones)
-    clips = list(lafan1._clips(held, rules, windows, 30))
+    clips = list(lafan1.shown_clips(held, rules, windows, 30))
     missing = slice(*(frame - rules.shown(30).start for frame in rules.hidden(30)))
     monkeypatch.setattr(lafan1, "fill", lambda clip, *_: (clip, missing, False))
-    row = lafan1.measure(held, rules, windows, 30, "spline", False)
+    row = lafan1.measure(held, rules, windows, 30, registry.get("spline"), False)
     assert len(clips[0]) == 41 if protocol == "official" else 30
     assert max(row.l2p, row.l2q, row.npss) < 1e-9
 
@@ -128,12 +101,30 @@ def test_nothing_leaks(published, protocol, method):
         poisoned.rotation[:, part] = [0.5, -0.5, 0.5, 0.5]
         poisoned.root[:, part] = 9.0
     for one, other in zip(
-        lafan1._clips(held, rules, windows, 20), lafan1._clips(held, rules, poisoned, 20), strict=True
+        lafan1.shown_clips(held, rules, windows, 20),
+        lafan1.shown_clips(held, rules, poisoned, 20),
+        strict=True,
     ):
-        a, missing, _ = lafan1.fill(one, rules, 20, method, method in ("cae", "cmib"))
-        b, _, _ = lafan1.fill(other, rules, 20, method, method in ("cae", "cmib"))
+        a, missing, _ = lafan1.fill(one, rules, 20, registry.get(method), method in ("cae", "cmib"))
+        b, _, _ = lafan1.fill(other, rules, 20, registry.get(method), method in ("cae", "cmib"))
         assert a.rotation[missing].tobytes() == b.rotation[missing].tobytes()
         assert a.translation[missing].tobytes() == b.translation[missing].tobytes()
+
+
+@pytest.mark.parametrize("protocol", list(PROTOCOLS))
+def test_kim_s_protocol_tells_methods_the_theme(published, protocol, monkeypatch):
+    held, rules = lafan1.load(published, "validation"), PROTOCOLS[protocol]
+    windows = cut(held.sequences, rules.window(30), 40, held.bones).spread(1)
+    told = []
+
+    def fill(clip, rules, gap, method, finished):  # type: ignore[no-untyped-def]
+        told.append(method.action)
+        return clip, slice(*(frame - rules.shown(gap).start for frame in rules.hidden(gap))), False
+
+    monkeypatch.setattr(lafan1, "fill", fill)
+    lafan1.measure(held, rules, windows, 30, registry.get("cmib"), False)
+    lafan1.measure(held, rules, windows, 30, registry.told("cmib", "walk"), False)
+    assert told == (["run", "walk"] if protocol == "cmib" else ["", "walk"])
 
 
 def test_the_whole_benchmark(published):

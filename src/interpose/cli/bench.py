@@ -6,12 +6,16 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from cyclopts import App
 
 from interpose.cli.console import console, say, say_json
 from interpose.errors import RequestError
+
+if TYPE_CHECKING:
+    from interpose.evaluation.conditions import Table
+    from interpose.methods.weights import Card
 
 bench = App(name="bench", help="Measure how good the methods are, by published protocols.")
 
@@ -161,6 +165,114 @@ def threshold(
         say_json(result.to_dict())
     else:
         say(str(result))
+
+
+@bench.command
+def representations(
+    *,
+    data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+) -> None:
+    """Kim et al. 2022, table 1: L2P of CMIB by how it holds rotations.
+
+    Networks to compare are trained by the same recipe and exported into folders of their own.
+
+    Try:
+      interpose train cmib --out runs/euler --set representation=euler --budget 20m
+      interpose export cmib --run runs/euler --out runs/euler/weights
+      interpose bench representations --weights runs/euler/weights --weights runs/quaternion/weights
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cmib` wrote, may be repeated; the installed weights without.
+        split: validation (subject 4) for development, test (subject 5) for final figures.
+        most: windows a length, spread over all of them; all without it.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.conditions import representations as measure
+
+    with _bar() as progress:
+        result = measure(data, _trained(weights), split, most, progress)
+    _print([result], json)
+
+
+@bench.command
+def anchors(
+    *,
+    data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+) -> None:
+    """Kim et al. 2022, table 5: by how much CMIB itself misses an anchor that was moved aside.
+
+    What users get meets every anchor: the motion is moved onto it. This is what the
+    network would do by itself, with and without the augmentation by random paths.
+
+    Try:
+      interpose train cmib --out runs/plain --set augmented=0 --budget 20m
+      interpose export cmib --run runs/plain --out runs/plain/weights
+      interpose bench anchors --weights weights/cmib --weights runs/plain/weights
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cmib` wrote, may be repeated; the installed weights without.
+        split: validation (subject 4) for development, test (subject 5) for final figures.
+        most: windows of walks and of runs, spread over all of them; all without it.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.conditions import anchors as measure
+
+    with _bar() as progress:
+        result = measure(data, _trained(weights), split, most, progress)
+    _print([result], json)
+
+
+@bench.command
+def actions(
+    *,
+    data: Path = Path("data"),
+    weights: Path | None = None,
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = 30,
+    json: bool = False,
+) -> None:
+    """Kim et al. 2022, table 6: L2P of CMIB when it is told the right action, and each other one.
+
+    Try:
+      interpose bench actions --data data --split test
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cmib` wrote; the installed weights without.
+        split: validation (subject 4) for development, test (subject 5) for final figures.
+        most: windows of each action and length, spread over all of them.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.conditions import actions as measure
+
+    with _bar() as progress:
+        result = measure(data, _trained([weights] if weights else [])[0], split, most, progress)
+    _print(result, json)
+
+
+def _trained(folders: list[Path]) -> list[Card]:
+    """The weights of CMIB in some folders, or the installed ones."""
+    from interpose.methods.weights import Card, find
+
+    return [Card.load(folder / "cmib.json") for folder in folders] or [find("cmib")]
+
+
+def _print(tables: list[Table], json: bool) -> None:
+    """Tables as text or as JSON."""
+    if json:
+        say_json([table.to_dict() for table in tables])
+    else:
+        say("\n\n".join(map(str, tables)))
 
 
 @contextmanager

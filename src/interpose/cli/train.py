@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +12,7 @@ from cyclopts import App
 from interpose.cli.console import say
 from interpose.cli.reading import split_names
 from interpose.cli.research import needs_torch
-from interpose.errors import FileError, RequestError
+from interpose.errors import FileError, RequestError, unknown
 
 if TYPE_CHECKING:
     from interpose.datasets import Pack
@@ -50,22 +51,43 @@ def check_splits(texts: list[str]) -> tuple[str, ...]:
     return splits
 
 
+def change(settings: Any, changes: list[str]) -> Any:
+    """A recipe's settings (a dataclass), some of them changed: "name=value"."""
+    kinds = {field.name: type(getattr(settings, field.name)) for field in fields(settings)}
+    found = {}
+    for text in changes:
+        name, _, value = text.partition("=")
+        if name not in kinds or kinds[name] not in (int, float, str):
+            raise unknown("setting", name, [n for n, kind in kinds.items() if kind in (int, float, str)])
+        try:
+            found[name] = kinds[name](value)
+        except ValueError:
+            raise RequestError(
+                f"cannot set {name} to {value!r}",
+                f"it is {kinds[name].__name__}",
+                f"Write --set {name}=NUMBER.",
+            ) from None
+    return replace(settings, **found)
+
+
 def _train(
     recipe: Callable[..., Any],
+    settings: Any,
     name: str,
     packs: Path,
     out: Path,
     budget: str,
     splits: list[str],
     start: str | None,
+    changes: list[str],
 ) -> None:
     """Run a recipe as its verb was told."""
     from interpose.methods import weights
     from interpose.training.budget import Budget
 
-    chosen = check_splits(splits)
+    changed, chosen = change(settings, changes), check_splits(splits)
     begin = weights.card(start) if start else None
-    recipe(load_packs(packs), out, Budget.parse(budget), splits=chosen, start=begin, say=say)
+    recipe(load_packs(packs), out, Budget.parse(budget), changed, splits=chosen, start=begin, say=say)
     say(f"done: {out}")
     say(f"Next: interpose export {name} --run {out} --packs {packs} --out weights/{name}")
 
@@ -78,6 +100,7 @@ def cae(
     budget: str = "25m",
     splits: list[str] = [],  # noqa: B006
     start: str | None = None,
+    set: list[str] = [],  # noqa: B006
 ) -> None:
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 
@@ -90,10 +113,11 @@ def cae(
         budget: device time or steps: 25m, 3h, 6000steps.
         splits: train (the default); train,validation for a final run of fixed budget.
         start: go on from these installed weights, by name, instead of from nothing.
+        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
-        from interpose.training.cae import train_cae
-    _train(train_cae, "cae", packs, out, budget, splits, start)
+        from interpose.training.cae import CaeSettings, train_cae
+    _train(train_cae, CaeSettings(), "cae", packs, out, budget, splits, start, set)
 
 
 @train.command
@@ -104,6 +128,7 @@ def cmib(
     budget: str = "25m",
     splits: list[str] = [],  # noqa: B006
     start: str | None = None,
+    set: list[str] = [],  # noqa: B006
 ) -> None:
     """Train CMIB, conditional motion in-betweening of Kim et al. An interrupted run goes on where it stopped.
 
@@ -116,7 +141,8 @@ def cmib(
         budget: device time or steps: 25m, 3h, 6000steps.
         splits: train (the default); train,validation for a final run of fixed budget.
         start: go on from these installed weights, by name, instead of from nothing.
+        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
-        from interpose.training.cmib import train_cmib
-    _train(train_cmib, "cmib", packs, out, budget, splits, start)
+        from interpose.training.cmib import CmibSettings, train_cmib
+    _train(train_cmib, CmibSettings(), "cmib", packs, out, budget, splits, start, set)

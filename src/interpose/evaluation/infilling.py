@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import Window, windows
 from interpose.finish import complete, feet, measures
 from interpose.finish.guarantees import wipe
@@ -110,7 +111,7 @@ class Infilling:
     def table(self, group: str = "all") -> str:
         """A Markdown table: mean error in cm, its deviation, and the ratio to the paper's linear row."""
         head = ["", *(f"{frames} frames" for frames in GAPS)]
-        lines = [head, ["---"] + ["---:"] * len(GAPS)]
+        lines = []
         for row in ROWS:
             cells = [row]
             for frames in GAPS:
@@ -118,17 +119,17 @@ class Infilling:
                 cell = f"{mean[0]:.2f} ± {mean[1]:.1f}" if mean else "-"
                 cells.append(cell + (f" ({ratio:.2f})" if ratio is not None else ""))
             lines.append(cells)
-        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        return markdown(head, lines)
 
     def feet_table(self) -> str:
         """A Markdown table of the feet in the gap, next to the truth's."""
         frames = [gap for gap in GAPS if gap]
-        lines = [["feet", *(f"{gap} frames" for gap in frames)], ["---"] + ["---:"] * len(frames)]
+        lines = []
         for row in self.feet:
             figures = [self.foot(row, gap) for gap in frames]
             cells = [f"{f['slide']:.1f}, {f['travel']:.2f}, {f['stance_speed']:.1f}" for f in figures]
             lines.append([row, *cells])
-        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        return markdown(["feet", *(f"{gap} frames" for gap in frames)], lines)
 
     def __str__(self) -> str:
         parts = [

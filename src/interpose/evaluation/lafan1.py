@@ -7,6 +7,7 @@ where sequences are missing from it only the ratio to interpolation can.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,10 +19,12 @@ import numpy as np
 from interpose.clip import Clip, Skeleton
 from interpose.datasets import clips
 from interpose.errors import RequestError, unknown
+from interpose.evaluation.table import markdown
 from interpose.finish import complete, feet, measures, seams
 from interpose.finish.guarantees import wipe
 from interpose.geometry import kinematics, rotations
 from interpose.methods import registry
+from interpose.methods.protocol import Actor, Method
 from interpose.observation import Gap, Observation
 from interpose.show.plot import line_plot
 from interpose.skeletons.canonical import PARENTS
@@ -31,6 +34,7 @@ STEP = 40  # frames from one test window to the next
 STATISTICS_WINDOW, STATISTICS_STEP = 50, 20
 WHOLE = 13  # sequences of subject 5 in the complete data set
 BATCH = 256  # windows whose kinematics are computed at once
+GLOBAL = "linear, global"  # straight lines of global positions
 LEAVES = [joint for joint in range(len(PARENTS)) if joint not in PARENTS]
 
 
@@ -79,7 +83,7 @@ class Protocol:
 
 PROTOCOLS = {
     "official": Protocol("official", (5, 15, 30, 45), False, PAST, True, False, "linear"),
-    "cmib": Protocol("cmib", (30, 40, 60, 80, 120), True, 1, False, True, "linear, global"),
+    "cmib": Protocol("cmib", (30, 40, 60, 80, 120), True, 1, False, True, GLOBAL),
 }
 
 
@@ -109,6 +113,11 @@ class Windows:
         some = np.linspace(0, len(self) - 1, most).astype(int)
         names = tuple(self.names[i] for i in some)
         return Windows(self.rotation[some], self.root[some], self.bones, names)
+
+
+def theme(name: str) -> str:
+    """What a sequence is of: "walk" of "walk1_subject5"."""
+    return re.split(r"\d", name)[0]
 
 
 def forward(rotation: np.ndarray, root: np.ndarray, bones: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -311,9 +320,8 @@ class Lafan1:
 
     def _markdown(self, head: str, cell: Callable[[str, int], str]) -> str:
         gaps = list(self.windows)
-        lines = [[head, *map(str, gaps)], ["---", *["---:"] * len(gaps)]]
-        lines += [[name, *(cell(name, gap) for gap in gaps)] for name in self.rows]
-        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        rows = [[name, *(cell(name, gap) for gap in gaps)] for name in self.rows]
+        return markdown([head, *map(str, gaps)], rows)
 
     def plot(self, path: Path | None = None) -> str:
         """L2P as a ratio to interpolation over the length of the gap, as SVG."""
@@ -379,24 +387,31 @@ def run(
         if gap not in cuts:
             cuts[gap] = cut(held.sequences, rules.window(gap), STEP, held.bones).spread(most)
             result.windows[gap] = len(cuts[gap])
-        row = measure(held, rules, cuts[gap], gap, name, finished)
+        method = None if name == GLOBAL else registry.get(name)
+        row = measure(held, rules, cuts[gap], gap, method, finished)
         result.rows.setdefault(f"{name}, finished" if finished else name, {})[gap] = row
         progress((done + 1) / len(work), f"{name} at {gap} frames")
     return result
 
 
-def measure(held: Data, rules: Protocol, windows: Windows, gap: int, name: str, finished: bool) -> Row:
-    """Complete all windows by a method and judge; a method sees nothing after the target."""
+def measure(
+    held: Data, rules: Protocol, windows: Windows, gap: int, method: Method | None, finished: bool
+) -> Row:
+    """Complete all windows by a method and judge; a method sees nothing after the target.
+
+    Without a method: straight lines of global positions.
+    """
     part = rules.judged(gap)
     truth_turned, truth = forward(windows.rotation[:, part], windows.root[:, part], windows.bones)
     start, extra = time.perf_counter(), []
-    if name == "linear, global":
+    if method is None:
         turned, placed = _global_lines(truth_turned, truth)
     else:
         rotation, root = windows.rotation[:, part].copy(), windows.root[:, part].copy()
         first, last = (frame - part.start for frame in rules.hidden(gap))
-        for i, clip in enumerate(_clips(held, rules, windows, gap)):
-            done, missing, fell_back = fill(clip, rules, gap, name, finished)
+        for i, clip in enumerate(shown_clips(held, rules, windows, gap)):
+            one = _told(method, theme(clip.name)) if rules.told else method
+            done, missing, fell_back = fill(clip, rules, gap, one, finished)
             rotation[i, first:last], root[i, first:last] = done.rotation[missing], done.root[missing]
             if finished:
                 extra.append((*_extra(done, missing), fell_back))
@@ -417,6 +432,13 @@ def measure(held: Data, rules: Protocol, windows: Windows, gap: int, name: str, 
     )
 
 
+def _told(method: Method, action: str) -> Method:
+    """The method, told what the motion is, if it knows such a thing and nobody has told it yet."""
+    if isinstance(method, Actor) and not method.action and action in method.card.labels:
+        return method.for_action(action)
+    return method
+
+
 def _global_lines(turned: np.ndarray, placed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Straight lines of global positions, and SLERP of global rotations, between the ends."""
     share = np.linspace(0, 1, turned.shape[1])[None, :, None]
@@ -424,19 +446,18 @@ def _global_lines(turned: np.ndarray, placed: np.ndarray) -> tuple[np.ndarray, n
     return rotations.slerp(turned[:, :1], turned[:, -1:], share), lines
 
 
-def fill(clip: Clip, rules: Protocol, gap: int, name: str, finished: bool) -> tuple[Clip, slice, bool]:
+def fill(clip: Clip, rules: Protocol, gap: int, method: Method, finished: bool) -> tuple[Clip, slice, bool]:
     """A clip completed by a method, `finished` with all guarantees; which frames were missing; and whether
     it fell back to a simpler method there."""
     start, stop = (frame - rules.shown(gap).start for frame in rules.hidden(gap))
     seen = Observation.from_gaps(clip, [Gap(start, stop)])
-    method = registry.get(name)
     if finished:
         done = complete(clip, seen, method)
-        return done.clip, slice(start, stop), any(one.method != name for one in done.report.gaps)
+        return done.clip, slice(start, stop), any(one.method != method.name for one in done.report.gaps)
     return method.complete(wipe(clip, seen), seen).clip, slice(start, stop), False
 
 
-def _clips(held: Data, rules: Protocol, windows: Windows, gap: int) -> Iterator[Clip]:
+def shown_clips(held: Data, rules: Protocol, windows: Windows, gap: int) -> Iterator[Clip]:
     """Each window as a clip of the frames that are shown; it ends with the target."""
     skeleton, part = replace(held.skeleton, rest_translation=windows.bones), rules.shown(gap)
     for rotation, root, name in zip(windows.rotation, windows.root, windows.names):

@@ -17,6 +17,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.datasets import clips
+from interpose.evaluation.table import markdown
 from interpose.finish import complete
 from interpose.methods import auto, registry
 from interpose.observation import Gap, Observation
@@ -73,10 +74,7 @@ class Skeletons:
 
     def table(self) -> str:
         """Markdown: a row a data set and length of gap."""
-        lines = [
-            ["data set", "fps", "gap", "windows", *METHODS, "fell back"],
-            ["---", *["---:"] * (4 + len(METHODS))],
-        ]
+        lines = []
         for dataset, gaps in self.errors.items():
             rates = ", ".join(f"{rate:.0f}" for rate in sorted(self.rates[dataset]))
             for gap, held in gaps.items():
@@ -91,7 +89,7 @@ class Skeletons:
                         str(self.fallen[dataset][gap]),
                     ]
                 )
-        return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        return markdown(["data set", "fps", "gap", "windows", *METHODS, "fell back"], lines)
 
     def __str__(self) -> str:
         checks = [f"{'met   ' if good else 'missed'}  {words}" for words, good in self.targets()]

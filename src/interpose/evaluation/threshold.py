@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from interpose.evaluation.infilling import DATASETS
+from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import windows
 from interpose.finish import complete
 from interpose.methods import registry
@@ -50,13 +51,10 @@ class Threshold:
         )
 
     def __str__(self) -> str:
-        lines = [["gap", *METHODS], ["---:"] * (1 + len(METHODS))]
-        for i, gap in enumerate(GAPS):
-            lines.append([str(gap), *(f"{self.errors[name][i]:.2f}" for name in METHODS)])
-        table = "\n".join("| " + " | ".join(line) + " |" for line in lines)
+        rows = [[str(gap), *(f"{self.errors[n][i]:.2f}" for n in METHODS)] for i, gap in enumerate(GAPS)]
         return (
-            f"{table}\n\nMean joint error in cm of finished fills, {self.count} windows of validation "
-            "performers.\n"
+            f"{markdown(['gap', *METHODS], rows)}\n\n"
+            f"Mean joint error in cm of finished fills, {self.count} windows of validation performers.\n"
             f"The network is better from {self.from_gap} frames on."
         )
 

@@ -47,7 +47,7 @@ def passes(complete: np.ndarray, longest: float) -> list[list[int]]:
 
 def run(
     path: Path, positions: np.ndarray, rotation: np.ndarray, keys: np.ndarray, label: int, bones: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Run the graph on one motion at 30 fps.
 
     Args:
@@ -59,7 +59,8 @@ def run(
         bones: (22,) lengths in metres.
 
     Returns:
-        The hips (T, 3) and canonical rotations (T, 22, 4), float64.
+        The hips (T, 3), canonical rotations (T, 22, 4), and by how much the network itself missed the hips of
+        keys (T,) before its motion was moved onto them, in metres; float64.
     """
     # Far from the origin float32 would lose millimetres.
     origin = positions[0, 0] * [1.0, 0.0, 1.0]
@@ -70,8 +71,8 @@ def run(
         "label": np.array([label]),
         "bones": bones[None].astype(np.float32),
     }
-    placed, turned = (out[0].astype(float) for out in weights.session(path).run(None, feed))
-    return placed[:, 0] + origin, rotations.normalize(turned)
+    placed, turned, missed = (out[0].astype(float) for out in weights.session(path).run(None, feed))
+    return placed[:, 0] + origin, rotations.normalize(turned), missed
 
 
 @dataclass(frozen=True)
@@ -80,20 +81,22 @@ class Cmib:
 
     Attributes:
         action: a label of its card; "" leaves it open.
+        trained: the weights; the installed ones without any.
     """
 
     action: str = ""
+    trained: weights.Card | None = None
     name = "cmib"
 
     @property
     def card(self) -> weights.Card:
-        return weights.find(self.name)
+        return self.trained or weights.find(self.name)
 
     def for_action(self, action: str) -> Cmib:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
         if action not in self.card.labels:
             raise unknown("action", action, [label for label in self.card.labels if label])
-        return Cmib(action)
+        return Cmib(action, self.trained)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: no humanoid, single joints, no key on one side, or more frames than it knows."""
@@ -117,6 +120,7 @@ class Cmib:
         placed = canonical_positions(turned, root, bones)
         label, lengths = card.labels.index(self.action), np.linalg.norm(bones, axis=-1)
         step, remarks = clip.fps / card.fps, {}
+        missed: dict[int, float] = {}
         for keys in passes(observation.frames, (card.max_gap + 1) * step + 1):
             first, last = keys[0], keys[-1]
             # Both ends lie on the network's grid; its frames may be a little longer or shorter for that.
@@ -127,7 +131,8 @@ class Cmib:
             positions = np.zeros((count, *placed.shape[1:]))
             rotation = np.tile([1.0, 0.0, 0.0, 0.0], (count, turned.shape[1], 1))
             known[slots], positions[slots], rotation[slots] = True, placed[keys], turned[keys]
-            hips, said = run(card.onnx, positions, rotation, known, label, lengths)
+            hips, said, off = run(card.onnx, positions, rotation, known, label, lengths)
+            missed |= {key: float(off[slot] / body.scale) for key, slot in zip(keys, slots)}
             for a, b in zip(keys, keys[1:]):
                 if remark := self._odd(root[a], root[b], (b - a) / clip.fps):
                     remarks[f"{a + 1}:{b}"] = [remark]
@@ -138,7 +143,7 @@ class Cmib:
             root[inside] = sample_smooth(hips, back)
             turned[inside] = sample_rotations_smooth(rotations.normalize(said), back)
         done = body.to_clip(turned, root / body.scale, base)
-        return Raw(done, notes={"model": card.name, "remarks": remarks})
+        return Raw(done, notes={"model": card.name, "remarks": remarks, "missed": missed})
 
     def _odd(self, here: np.ndarray, there: np.ndarray, seconds: float) -> str | None:
         """How two keys contradict the action, if they do: by the pace that they ask for (figure 9).

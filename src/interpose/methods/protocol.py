@@ -7,11 +7,12 @@ that nothing can leak, and returns its raw completion. `complete` then enforces 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.methods.weights import Card
 from interpose.observation import Gap, Observation
 
 
@@ -46,3 +47,21 @@ class Method(Protocol):
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Complete the clip: all values, at every frame. Unobserved values of `clip` carry no information."""
+
+
+@runtime_checkable
+class Actor(Method, Protocol):
+    """A method that can be told what the motion is.
+
+    Attributes:
+        action: what it has been told; "" for nothing.
+        card: of its weights, with the labels that it knows.
+    """
+
+    action: str
+
+    @property
+    def card(self) -> Card: ...
+
+    def for_action(self, action: str) -> Method:
+        """The same method, told another action. Raises RequestError for one that it does not know."""

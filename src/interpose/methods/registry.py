@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 
 from interpose.errors import RequestError, unknown
-from interpose.methods.protocol import Method
+from interpose.methods.protocol import Actor, Method
 
 # name: (module, class); the class is called without arguments.
 METHODS: dict[str, tuple[str, str]] = {
@@ -64,7 +64,7 @@ def told(name: str, action: str) -> Method:
     method = get(name)
     if not action:
         return method
-    if not hasattr(method, "for_action"):
+    if not isinstance(method, Actor):
         raise RequestError(
             f"cannot make it {action} with {name}", f"{name} knows no actions", "Use --method cmib."
         )

@@ -18,7 +18,7 @@ from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.skeletons.body import facing
 
-WIDTH = 7 * len(JOINTS)  # a position and a quaternion of each of the 22 joints: 154
+POSITIONS = 3 * len(JOINTS)
 
 PLACE = 0.3  # deviation of learned positions at first: of about the size of the numbers of a frame
 
@@ -36,6 +36,8 @@ class CmibConfig:
             how much two frames attend to each other has a learned part for how far apart they are (Qin et
             al. 2022, both); layers are normalised before, not after, and the network sees standardised
             numbers.
+        representation: how a frame holds rotations: "quaternion", "axis-angle" or "euler", which the paper
+            compares in table 1. A head has 22 numbers with each.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -45,6 +47,26 @@ class CmibConfig:
     dropout: float = 0.05
     longest: int = 160
     residual: bool = True
+    representation: str = "quaternion"
+
+    @property
+    def width(self) -> int:
+        """Numbers of a frame: positions and rotations of the 22 joints, 154 with quaternions."""
+        return POSITIONS + len(JOINTS) * (4 if self.representation == "quaternion" else 3)
+
+
+def encode(turned: Tensor, representation: str) -> Tensor:
+    """Quaternions (..., 4) as a frame holds them, (..., 4) or radians (..., 3)."""
+    if representation == "axis-angle":
+        return rotations.log(turned)
+    return rotations.to_euler(turned, "ZXY") if representation == "euler" else turned
+
+
+def decode(held: Tensor, representation: str) -> Tensor:
+    """The unit quaternions (..., 4) of what frames hold."""
+    if representation == "axis-angle":
+        return rotations.exp(held)
+    return rotations.from_euler(held, "ZXY") if representation == "euler" else rotations.normalize(held)
 
 
 class Encoder(nn.Module):
@@ -52,13 +74,14 @@ class Encoder(nn.Module):
 
     def __init__(self, config: CmibConfig) -> None:
         super().__init__()
-        self.label = nn.Embedding(len(config.labels), WIDTH)
+        width = config.width
+        self.label = nn.Embedding(len(config.labels), width)
         self.residual = config.residual
         self.place = nn.ParameterList(
-            PLACE * torch.randn(config.longest, WIDTH) for _ in range(2 if self.residual else 1)
+            PLACE * torch.randn(config.longest, width) for _ in range(2 if self.residual else 1)
         )
         layer = nn.TransformerEncoderLayer(
-            WIDTH,
+            width,
             config.heads,
             config.inner,
             config.dropout,
@@ -66,19 +89,19 @@ class Encoder(nn.Module):
             batch_first=True,
             norm_first=self.residual,
         )
-        norm = nn.LayerNorm(WIDTH) if self.residual else None
+        norm = nn.LayerNorm(width) if self.residual else None
         self.layers = nn.TransformerEncoder(layer, config.layers, norm, enable_nested_tensor=False)
-        self.last = nn.Linear(WIDTH, WIDTH)
+        self.last = nn.Linear(width, width)
         if self.residual:
-            self.register_buffer("mean", torch.zeros(WIDTH))
-            self.register_buffer("std", torch.ones(WIDTH))
-            self.first = nn.Linear(WIDTH, WIDTH)
+            self.register_buffer("mean", torch.zeros(width))
+            self.register_buffer("std", torch.ones(width))
+            self.first = nn.Linear(width, width)
             self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1))
             nn.init.zeros_(self.last.weight)
             nn.init.zeros_(self.last.bias)
 
     def forward(self, frames: Tensor, keys: Tensor, label: Tensor) -> tuple[Tensor, Tensor]:
-        """Frames (B, T, 154), keys (B, T) and labels (B,) to the token (B, 154) and frames (B, T, 154)."""
+        """Frames (B, T, n), keys (B, T) and labels (B,) to the token (B, n) and frames (B, T, n)."""
         token = self.label(label)[:, None]
         seen = self.first((frames - self.mean) / self.std) if self.residual else frames
         deep = torch.cat([token, seen + self._places(keys)], dim=1)
@@ -90,13 +113,13 @@ class Encoder(nn.Module):
 
     @torch.no_grad()
     def standardise(self, frames: Tensor) -> None:
-        """Take mean and deviation of what the network sees from frames (n, 154)."""
+        """Take mean and deviation of what the network sees from frames (m, n)."""
         self.mean.copy_(frames.mean(dim=0))
         # What hardly moves (a twist that no joint has) must not become all there is to see.
         self.std.copy_(frames.std(dim=0).clamp(min=0.02))
 
     def _places(self, keys: Tensor) -> Tensor:
-        """Learned positions, (B, T, 154) or (T, 154)."""
+        """Learned positions, (B, T, n) or (T, n)."""
         if not self.residual:
             return self.place[0][: keys.shape[1]]
         last, first = neighbours(keys)
@@ -158,7 +181,7 @@ class Cmib(nn.Module):
         self.encoder = Encoder(self.config)
 
     def prepare(self, positions: Tensor, rotation: Tensor, keys: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Interpolated frames (B, T, 154) seen from the keys, and the frame: its origin (B, 3) and yaw (B,).
+        """Interpolated frames (B, T, n) seen from the keys, and the frame: its origin (B, 3) and yaw (B,).
 
         The first key faces X, as in LAFAN1's protocol; the origin is halfway between first and last key.
         """
@@ -178,14 +201,17 @@ class Cmib(nn.Module):
         begin = pick(rotation.flatten(2), start).unflatten(2, (len(JOINTS), 4))
         begin = torch.where(begin[..., :1] < 0, -begin, begin)
         rotation = rotations.alike(rotation, begin)
-        frames = torch.cat(
-            [between_keys(positions, keys).flatten(2), between_keys(rotation, keys).flatten(2)], dim=2
-        )
-        return frames, origin, yaw
+        held = encode(between_keys(rotation, keys), self.config.representation)
+        return torch.cat([between_keys(positions, keys).flatten(2), held.flatten(2)], dim=2), origin, yaw
+
+    def split(self, frames: Tensor) -> tuple[Tensor, Tensor]:
+        """Frames (B, T, n) to positions (B, T, 22, 3) and what they hold of rotations (B, T, 22, 3 or 4)."""
+        joints = (len(JOINTS), -1)
+        return frames[..., :POSITIONS].unflatten(2, joints), frames[..., POSITIONS:].unflatten(2, joints)
 
     def forward(
         self, positions: Tensor, rotation: Tensor, keys: Tensor, label: Tensor, bones: Tensor
-    ) -> tuple[Tensor, Tensor]:
+    ) -> tuple[Tensor, Tensor, Tensor]:
         """Complete a motion.
 
         Args:
@@ -196,13 +222,14 @@ class Cmib(nn.Module):
             bones: (B, 22) lengths of bones in metres.
 
         Returns:
-            Positions (B, T, 22, 3) with bones restored, and rotations (B, T, 22, 4).
+            Positions (B, T, 22, 3) with bones restored, rotations (B, T, 22, 4), and by how much the network
+            itself was wrong about the hips (B, T), in metres at keys, before its motion was moved onto them.
         """
         frames, origin, yaw = self.prepare(positions, rotation, keys)
-        out = settle(self.encoder(frames, keys, label)[1], frames, keys)
-        count = 3 * len(JOINTS)
-        placed = restore_bones(out[..., :count].unflatten(2, (len(JOINTS), 3)), bones)
-        turned = rotations.normalize(out[..., count:].unflatten(2, (len(JOINTS), 4)))
+        said = self.encoder(frames, keys, label)[1]
+        missed = torch.where(keys, (said - frames)[..., :3].norm(dim=-1), 0.0)
+        placed, held = self.split(settle(said, frames, keys))
+        placed, turned = restore_bones(placed, bones), decode(held, self.config.representation)
         placed = turn(placed, yaw[:, None, None]) + origin[:, None, None]
         turned = rotations.multiply(rotations.about("Y", yaw)[:, None, None], turned)
-        return placed, turned
+        return placed, turned, missed

@@ -13,13 +13,10 @@ from torch import Tensor, nn
 from interpose.datasets import Pack
 from interpose.geometry import rotations
 from interpose.methods.weights import Card
-from interpose.models.cmib import Cmib, CmibConfig
-from interpose.skeletons import JOINTS
+from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
 from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
 from interpose.training.poses import Batch, Poses, labels_of, new_path
-
-POSITIONS = 3 * len(JOINTS)
 
 
 @dataclass
@@ -40,6 +37,7 @@ class CmibSettings(Settings):
     rotation: float = 2.0
     placed: float = 0.05
     dropout: float = 0.0  # the paper: .05; drawing it takes a third of the time, and the run is short
+    representation: str = "quaternion"  # table 1; also "axis-angle" and "euler"
     decay: float = 0.01
     betas: tuple[float, float] = (0.9, 0.99)
 
@@ -87,28 +85,25 @@ class Losses:
         frames, _, _ = self.model.prepare(positions, batch.rotation, keys)
         # The truth in the frame of the keys: its origin is that of the ends, which are keys, too.
         truth, _, _ = self.model.prepare(positions, batch.rotation, torch.ones_like(keys))
-        true = truth[..., :POSITIONS]
+        true, true_held = self.model.split(truth)
         with torch.autocast(frames.device.type, torch.bfloat16):
             token, out = self.model.encoder(frames, keys, batch.label)
-        out, label = out.float(), self.model.encoder.label(batch.label)
-        turned = rotations_of(out)
-        through = Batch(rotations.normalize(turned), out[..., :3], batch.bones, batch.label).positions()
+        label, (said, held) = self.model.encoder.label(batch.label), self.model.split(out.float())
+        if held.shape[-1] == 4:  # both quaternions of a rotation are right: the one near interpolation's
+            true_held = rotations.alike(true_held, self.model.split(frames)[1])
+        turned = decode(held, self.model.config.representation)
+        through = Batch(turned, said[:, :, 0], batch.bones, batch.label).positions()
         return (
             (token.float() - label).abs().mean(),
-            100 * (out[..., :POSITIONS] - true).abs().mean(),
-            (turned - rotations.alike(rotations_of(truth), rotations_of(frames))).abs().mean(),
-            100 * (through.flatten(2) - true).abs().mean(),
+            100 * (said - true).abs().mean(),
+            (held - true_held).abs().mean(),
+            100 * (through - true).abs().mean(),
         )
 
     def __call__(self, batch: Batch, keys: Tensor) -> Tensor:
         asked = self.settings
         weights = (asked.semantic, asked.position, asked.rotation, asked.placed)
         return torch.stack([weight * part for weight, part in zip(weights, self.parts(batch, keys))]).sum()
-
-
-def rotations_of(frames: Tensor) -> Tensor:
-    """The quaternions (B, T, 22, 4) of frames (B, T, 154)."""
-    return frames[..., POSITIONS:].unflatten(2, (len(JOINTS), 4))
 
 
 def train_cmib(
@@ -127,7 +122,9 @@ def train_cmib(
     labels = labels_of(packs, splits)
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
-    model = Cmib(CmibConfig(labels, dropout=settings.dropout)).to(device)
+    heads = 7 if settings.representation == "quaternion" else 6
+    config = CmibConfig(labels, heads, dropout=settings.dropout, representation=settings.representation)
+    model = Cmib(config).to(device)
     if start:
         restore(model, start.onnx)
     elif model.config.residual:
@@ -182,7 +179,7 @@ def validate(model: nn.Module, batch: Batch) -> dict[str, float]:
         part = slice(0, length)
         keys = torch.zeros(len(positions), length, dtype=torch.bool, device=positions.device)
         keys[:, [0, -1]] = True
-        placed, turned = model(positions[:, part], batch.rotation[:, part], keys, batch.label, bones)
+        placed, turned, _ = model(positions[:, part], batch.rotation[:, part], keys, batch.label, bones)
         share = torch.linspace(0, 1, length, device=positions.device)[:, None, None]
         line = positions[:, :1] + share * (positions[:, length - 1 : length] - positions[:, :1])
         placed = Batch(turned, placed[:, :, 0], batch.bones, batch.label).positions()

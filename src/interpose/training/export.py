@@ -52,7 +52,7 @@ def export_cmib_onnx(model: Cmib, path: Path) -> None:
         "label": (torch.zeros(2, dtype=torch.long), {0: sizes[0]}),
         "bones": (torch.rand(2, len(JOINTS)) + 0.1, {0: sizes[0]}),
     }
-    _write_graph(model, inputs, ["positions_out", "rotation_out"], path)
+    _write_graph(model, inputs, ["positions_out", "rotation_out", "missed"], path)
 
 
 def _sizes(longest: int) -> dict[int, Any]:
