@@ -110,7 +110,8 @@ def test_no_pop_at_seams(walk, make, start):
     assert report.seam_after == pytest.approx(100 * jump)
     assert report.seam_limit == pytest.approx(100 * limit)
     assert jump <= limit
-    assert not report.notes or report.method == "spline"
+    # Noise may put a foot into a shin, which is said, too.
+    assert report.method == "spline" or all(" cm into the " in note for note in report.notes)
 
 
 def test_limit_is_the_percentile_of_observed_motion_only(walk):

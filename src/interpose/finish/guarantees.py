@@ -12,7 +12,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, measures, seams
+from interpose.finish import feet, measures, penetration, seams
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow, runs
@@ -421,6 +421,7 @@ def _report(
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
     after = _jump(finished, known, _at(gap))
+    inside = penetration.deepest(finished, gap.start, gap.stop)
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,
@@ -438,9 +439,11 @@ def _report(
         foot_slide=held[0] if held else None,
         foot_slide_before=unheld[0] if unheld else None,
         foot_travel=held[1] if held else None,
+        penetration=_centi(inside[0] if inside else None),
         drift=_centi(_drift(raw.notes, gap)) if own else None,
         notes=(
             *span.notes,
+            *((inside[1],) if inside and inside[1] else ()),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
     )

@@ -44,6 +44,7 @@ class GapReport:
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.
+        penetration: cm, how deep the body goes into itself; a note says where if that is out of the ordinary.
         drift: cm, of the root trajectory before it was spread over the gap.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
@@ -64,6 +65,7 @@ class GapReport:
     foot_slide: float | None = None
     foot_slide_before: float | None = None
     foot_travel: float | None = None
+    penetration: float | None = None
     drift: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0
