@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from interpose.finish import Completion
     from interpose.formats import load, save
     from interpose.methods.registry import names as method_names
-    from interpose.observation import Gap, Observation, Pin
+    from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.scan import scan
 
 __version__ = "0.1.0"
@@ -36,6 +36,7 @@ __all__ = [
     "Gap",
     "InterposeError",
     "Observation",
+    "Part",
     "Pin",
     "RequestError",
     "Skeleton",
@@ -57,6 +58,7 @@ _HOMES = {
     "Gap": "interpose.observation",
     "InterposeError": "interpose.errors",
     "Observation": "interpose.observation",
+    "Part": "interpose.observation",
     "Pin": "interpose.observation",
     "RequestError": "interpose.errors",
     "Skeleton": "interpose.clip",
@@ -91,6 +93,7 @@ def fill(
     only: Sequence[int] | None = None,
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    parts: Part | Sequence[Part] = (),
 ) -> Completion:
     """Fill gaps of a clip; what is observed comes back unchanged, bit for bit.
 
@@ -104,6 +107,7 @@ def fill(
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
         seed: for methods that sample.
         progress: called with the share done, 0 to 1.
+        parts: poses of single joints that other clips give inside of the gaps.
 
     Returns:
         The completion: `.clip`, `.report` (one entry a gap; `.report.open` lists what was left), `.raw` and
@@ -115,7 +119,7 @@ def fill(
     """
     from interpose import tasks
     from interpose.errors import RequestError
-    from interpose.observation import Observation
+    from interpose.observation import Observation, Part
     from interpose.observation.scan import scan, to_gaps
 
     clip = _clip(clip)
@@ -129,7 +133,10 @@ def fill(
             )
     else:
         wanted = gaps if isinstance(gaps, Observation) else [_gap(gap) for gap in _several(gaps)]
-    return tasks.fill(clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress)
+    given = [parts] if isinstance(parts, Part) else list(parts)
+    return tasks.fill(
+        clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress, parts=given
+    )
 
 
 def recover(

@@ -20,7 +20,8 @@ from interpose.finish.windows import ramp, runs
 from interpose.geometry import rotations
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method, Raw
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Part
+from interpose.observation.part import lay
 from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
@@ -51,6 +52,7 @@ def fill(
     methods: Mapping[int, str] | None = None,
     progress: Callable[[float], None] | None = None,
     action: str = "",
+    parts: Sequence[Part] = (),
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
 
@@ -65,16 +67,18 @@ def fill(
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
         action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
+        parts: poses of single joints that other clips give inside of the gaps.
 
     Returns:
         The completion; `report.open` lists the gaps left open.
 
     Raises:
         RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
-            observed.
+            observed; a part that does not fit.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     check_pins(observation)
+    clip, observation = lay(clip, observation, parts)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
             "there is nothing to go by",

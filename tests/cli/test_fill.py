@@ -316,3 +316,28 @@ def test_npz_in_npz_out(run, take):
     assert done.code == 0
     assert take.with_name("take.filled.npz").exists()
     assert "unit" not in json.loads(take.with_name("take.filled.json").read_text())
+
+
+def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data):
+    take.with_name("jump.bvh").write_bytes((data / "cmu_jump.bvh").read_bytes())
+    words = ["fill", "take.bvh", "--gap", "60:90", "--joints", "RightArm,RightHand", "--method", "spline"]
+    given = ["--from", "jump.bvh", "--from-range", "40:48", "--at", "70"]
+    done = run(*words, *given, "--json")
+    assert done.code == 0
+    assert done.json["parts"] == [
+        {"file": "jump.bvh", "frames": "40:48", "at": 70, "joints": ["RightArm", "RightHand"]}
+    ]
+    first, jump = load(take.with_name("take.filled.bvh")), load(take.with_name("jump.bvh"))
+    arm = first.skeleton.index("RightArm")
+    assert np.abs(first.rotation[70:78, arm] - jump.rotation[40:48, arm]).max() < 1e-5
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh").code == 0
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+    assert run("fill", "take.bvh", "--gap", "60:90", *given, "-o", "x.bvh").err.startswith(
+        "error: --from needs"
+    )
+    assert (
+        "no other clip is named" in run("fill", "take.bvh", "--gap", "60:90", "--at", "70", "-o", "x.bvh").err
+    )
+    assert (
+        "--from-range 4-8" in run(*words, *given[:2], "--from-range", "4-8", "--at", "70", "-o", "x.bvh").err
+    )

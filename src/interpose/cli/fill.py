@@ -26,6 +26,9 @@ def fill(
     gap: list[str] = [],  # noqa: B006
     joints: list[str] = [],  # noqa: B006
     gaps: Path | None = None,
+    from_: Annotated[Path | None, Parameter(name="--from")] = None,
+    from_range: str | None = None,
+    at: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str | None = None,
     max_gap: int | None = None,
@@ -48,6 +51,8 @@ def fill(
       interpose fill take.bvh --gap 120:160 --joints LeftArm,LeftForeArm --player
       interpose fill take.bvh --max-gap 90 --only-gap 2 --method spline
       interpose fill take.bvh --gaps take.filled.json -o again.bvh   (once more)
+      interpose fill walk.bvh --gap 120:150 --from wave.bvh --from-range 40:48 --at 130
+        --joints RightArm,RightForeArm,RightHand   (with the arm of another clip in it)
 
     Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
 
@@ -56,6 +61,9 @@ def fill(
         gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
         joints: the joints that are missing, separated by commas: in each --gap, or else in the whole clip.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
+        from_: another clip of the same character that gives poses of the --joints inside of a gap.
+        from_range: START:STOP, the frames of it that are used; all without it.
+        at: the frame at which they begin.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         max_gap: leave gaps of more than this many frames open, and list them.
@@ -67,10 +75,12 @@ def fill(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method, from_options, reading_of, roles_of
+    from interpose.cli.request import check_method, from_options, part_of, parts_to_dict, reading_of, roles_of
 
     clip = reading_of(gaps, reading).load(file, roles_of(gaps))
-    request = from_options(file, clip, gap, joints, gaps)
+    parts = part_of(from_, from_range, at, joints, reading)
+    request = from_options(file, clip, gap, [] if parts else joints, gaps, reading)
+    request = replace(request, parts=request.parts + parts)
     if method is not None:
         check_method(method)
         request = replace(request, method=method, methods={})
@@ -97,9 +107,13 @@ def fill(
             methods=request.methods,
             progress=advance,
             action=request.action,
+            parts=[part for _, part in request.parts],
         )
     why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
-    return finish("fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force)
+    more = {"parts": parts_to_dict(request.parts)} if request.parts else {}
+    return finish(
+        "fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force, more=more
+    )
 
 
 def _why(gap: Gap, max_gap: int | None) -> str:
@@ -122,8 +136,9 @@ def _dry_run(
     """Say what would be done."""
     from interpose import tasks
     from interpose.observation import Observation
+    from interpose.observation.part import lay
 
-    seen = Observation.from_gaps(clip, request.gaps)
+    clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), [part for _, part in request.parts])
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
     left = any(job.method is None for job in jobs)
     if as_json:

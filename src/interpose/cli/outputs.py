@@ -29,6 +29,7 @@ UNITS = {
     "foot_slide": "cm/s",
     "foot_slide_before": "cm/s",
     "foot_travel": "m",
+    "penetration": "cm",
     "drift": "cm",
 }
 
@@ -132,11 +133,13 @@ def to_json(
     completion: Completion,
     seed: int | None,
     why: dict[int, str],
+    more: dict[str, Any],
 ) -> dict[str, Any]:
     """The report as it is written beside the clip; `fill --gaps` replays it.
 
     Args:
         why: for the number of each open gap why it is open.
+        more: what only this verb says.
     """
     report = completion.report.to_dict()
 
@@ -156,6 +159,7 @@ def to_json(
         "method": report["method"],
         **({"action": report["action"]} if report["action"] else {}),
         "seed": seed,
+        **more,
         "gaps": [entry(gap["number"], gap) for gap in report["gaps"]],
         "open": [
             {
@@ -182,9 +186,10 @@ def finish(
     *,
     json: bool,
     force: bool,
+    more: dict[str, Any] | None = None,
 ) -> int:
     """Write everything, print the report, and return the exit code: 4 when a gap stays open."""
-    report = to_json(verb, file, outputs.clip, clip, completion, seed, why)
+    report = to_json(verb, file, outputs.clip, clip, completion, seed, why, more or {})
     notes = write(outputs, force, clip, completion, report)
     if json:
         say_json(report)
@@ -234,9 +239,8 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
     )
     if gaps:
         say("\n".join(_legend(gaps)), style="dim")
-    for gap in gaps:
-        for note in gap.notes:
-            say(f"gap {gap.number}: {note}")
+    for number, note in dict.fromkeys((gap.number, note) for gap in gaps for note in gap.notes):
+        say(f"gap {number}: {note}")
     for number, left in numbered(completion):
         say(f"gap {number} stays open: {left} ({seconds(len(left), fps)}), {why.get(number, 'not filled')}")
 

@@ -10,7 +10,7 @@ from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
 from interpose.errors import RequestError, unknown
-from interpose.observation import Gap
+from interpose.observation import Gap, Part
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import scan, to_gaps
 
@@ -27,6 +27,7 @@ class Request:
         why: why a gap stays open, by number, where an earlier report says it.
         said: lines for the user: where the gaps come from.
         action: what the motion is, for methods that know actions.
+        parts: poses of single joints from other clips, each with the path of its clip.
     """
 
     gaps: list[Gap]
@@ -37,9 +38,17 @@ class Request:
     why: dict[int, str] = field(default_factory=dict)
     said: str = ""
     action: str = ""
+    parts: list[tuple[Path, Part]] = field(default_factory=list)
 
 
-def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], gaps: Path | None) -> Request:
+def from_options(
+    file: Path,
+    clip: Clip,
+    ranges: list[str],
+    joints: list[str],
+    gaps: Path | None,
+    reading: Reading,
+) -> Request:
     """The request of `fill`. Raises RequestError when it does not fit the clip or nothing is missing."""
     chosen = split_names(joints) or None
     if joints and not chosen:
@@ -58,7 +67,9 @@ def from_options(file: Path, clip: Clip, ranges: list[str], joints: list[str], g
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
             fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."
             raise RequestError("--gap does not go with a report", why, fix)
-        request = _replay(gaps, filled, content) if is_report(content) else Request([*filled, *listed])
+        request = (
+            _replay(gaps, filled, content, reading) if is_report(content) else Request([*filled, *listed])
+        )
     elif listed:
         request = Request(listed)
     elif chosen:
@@ -95,7 +106,45 @@ def _scanned(file: Path, clip: Clip) -> Request:
     return Request(gaps, said="\n".join(lines))
 
 
-def _replay(path: Path, filled: list[Gap], content: dict[str, Any]) -> Request:
+def part_of(
+    path: Path | None, span: str | None, at: int | None, joints: list[str], reading: Reading
+) -> list[tuple[Path, Part]]:
+    """The part that the options of `fill` name: --from, --from-range, --at and --joints."""
+    if path is None:
+        if span is not None or at is not None:
+            why = "--from-range and --at say which frames of another clip go where"
+            raise RequestError("no other clip is named", why, "Name it with --from FILE.")
+        return []
+    names = split_names(joints)
+    if at is None or not names:
+        why = "they say where the other clip's frames begin, and which joints are taken"
+        raise RequestError(
+            "--from needs --at and --joints", why, "Write --at 130 --joints RightArm,RightHand."
+        )
+    clip = reading.load(path)
+    whole = Gap(0, len(clip)) if span is None else _frames(span)
+    return [(path, Part(clip, whole.start, whole.stop, at, names))]
+
+
+def _frames(text: str) -> Gap:
+    try:
+        return Gap.parse(text)
+    except RequestError as error:
+        fix = "Write --from-range 40:48 for the frames 40 to 47."
+        raise RequestError(
+            f"cannot read --from-range {text}", error.why.replace("a gap", "it"), fix
+        ) from None
+
+
+def parts_to_dict(parts: list[tuple[Path, Part]]) -> list[dict[str, Any]]:
+    """For a report, so that it can be replayed."""
+    return [
+        {"file": str(path), "frames": f"{part.start}:{part.stop}", "at": part.at, "joints": list(part.joints)}
+        for path, part in parts
+    ]
+
+
+def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Reading) -> Request:
     """The gaps of a report, filled and open ones as they were, each by the method named in it."""
     left = content["open"]
     open_gaps = [
@@ -104,6 +153,14 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any]) -> Request:
     methods: dict[int, set[str]] = {}
     for entry in content["gaps"]:
         methods.setdefault(entry["number"], set()).add(entry["method"])
+    parts = [
+        part
+        for one in content.get("parts", [])
+        for part in part_of(Path(one["file"]), one["frames"], one["at"], one["joints"], reading)
+    ]
+    # The report of a gap with parts lists their frames by themselves, without the joints that they gave.
+    holed = [gap for gap in filled if any(gap.start <= part.at < gap.stop for _, part in parts)]
+    filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
     return Request(
         [*filled, *open_gaps],
         content["method"],
@@ -114,6 +171,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any]) -> Request:
         {one["number"]: one["why"] for one in left},
         f"as in {path}",
         str(content.get("action", "")),
+        parts,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import feet, measures, penetration, seams
+from interpose.finish.loose import Layer, loose, without
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow, runs
@@ -99,6 +100,10 @@ def complete(
     check_pins(observation)
     hidden = wipe(clip, observation)
     known = _trusted(hidden, observation)
+    hanging = loose(hidden, known)
+    if hanging.any() and not isinstance(method, Layer):
+        body = complete(clip, without(observation, hanging), method, seed, fallback, limit)
+        method = Layer(method.name, body.clip, body.raw, hanging)
     gaps = known.gaps(clip.skeleton)
     if not gaps:
         return Completion(
@@ -127,7 +132,8 @@ def complete(
             _fade(current, source, hidden, known, span)
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
-            _plant(current, known, span, bounds)
+            if source is not opinion or not isinstance(method, Layer):  # a layer's body stands already
+                _plant(current, known, span, bounds)
         for _ in range(ROUNDS):
             for span in chosen:
                 _soften(current, known, span, limit)

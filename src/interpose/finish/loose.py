@@ -1,0 +1,59 @@
+"""Joints that are known while the body they hang on is not: an arm of another take inside a gap.
+
+Networks are told where joints are, and of such an arm nobody knows where it is. So the body is completed
+first, and the joints are laid on it: what they differ by is known where they are known, nothing outside of
+the gap, and a spline in between. (Kaufmann et al. 2020, figure 7, blend this way.)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.geometry import rotations
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+
+
+def loose(clip: Clip, observation: Observation) -> np.ndarray:
+    """(F, J) True for rotations that are known in frames in which their root's is not."""
+    skeleton = clip.skeleton
+    found = np.zeros_like(observation.rotation)
+    for joint in range(len(skeleton)):
+        root = next((above for above in skeleton.ancestors(joint) if skeleton.parents[above] < 0), joint)
+        found[:, joint] = observation.rotation[:, joint] & ~observation.rotation[:, root]
+    return found
+
+
+def without(observation: Observation, some: np.ndarray) -> Observation:
+    """The observation with some rotations (F, J) unknown."""
+    return replace(observation, rotation=observation.rotation & ~some)
+
+
+@dataclass
+class Layer:
+    """A method's completion of the body with the loose joints (F, J) laid on it."""
+
+    name: str
+    body: Clip
+    raw: Raw
+    joints: np.ndarray
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        """Never: the body is there already."""
+        return None
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        """The body with the joints on it."""
+        off = rotations.multiply(rotations.conjugate(self.body.rotation), clip.rotation)
+        off = np.where(self.joints[..., None], off, [1.0, 0.0, 0.0, 0.0])
+        # Nothing is to be added where the whole pose is known, nor to joints that are never loose.
+        known = self.joints | observation.frames[:, None] | ~self.joints.any(axis=0)
+        change = Spline().complete(
+            clip.with_motion(off, np.zeros_like(clip.translation)), Observation(known, np.ones_like(known))
+        )
+        rotation = rotations.multiply(self.body.rotation, change.clip.rotation)
+        return Raw(self.body.with_motion(rotation, self.body.translation), notes=self.raw.notes)

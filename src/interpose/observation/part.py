@@ -1,0 +1,94 @@
+"""Poses of single joints that another clip gives, inside of a gap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.geometry import rotations
+from interpose.observation.observation import Observation
+
+SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
+
+
+@dataclass(frozen=True)
+class Part:
+    """Local rotations of some joints over some frames of another clip.
+
+    Attributes:
+        clip: the other clip; its skeleton has the joints under the same names and with the same rest pose.
+        start, stop: its frames start to stop - 1.
+        at: the frame of the completed clip at which they begin.
+        joints: names.
+    """
+
+    clip: Clip
+    start: int
+    stop: int
+    at: int
+    joints: tuple[str, ...]
+
+
+def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Clip, Observation]:
+    """The clip with the parts in it, and the observation that knows them.
+
+    Raises:
+        RequestError: frames or joints that are not there, a part that reaches out of the gaps, another frame
+            rate, or joints that rest differently.
+    """
+    rotation, known = clip.rotation.copy(), observation.rotation.copy()
+    for part in parts:
+        _check(clip, observation, part)
+        to = slice(part.at, part.at + part.stop - part.start)
+        for name in part.joints:
+            here, there = clip.skeleton.index(name), part.clip.skeleton.index(name)
+            rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
+            known[to, here] = True
+    laid = Observation(known, observation.translation, observation.trust, observation.pins)
+    return clip.with_motion(rotation, clip.translation), laid
+
+
+def _check(clip: Clip, observation: Observation, part: Part) -> None:
+    if not 0 <= part.start < part.stop <= len(part.clip):
+        raise RequestError(
+            f"there are no frames {part.start}:{part.stop} in the other clip",
+            f"it has {len(part.clip)} frames",
+            f"Choose some of 0:{len(part.clip)}.",
+        )
+    if abs(part.clip.fps - clip.fps) > 0.01:
+        raise RequestError(
+            "the two clips have different frame rates",
+            f"one has {clip.fps:g} and the other {part.clip.fps:g} frames a second",
+            "Bring the other one to the same rate first: interpose convert --fps.",
+        )
+    stop = part.at + part.stop - part.start
+    joints = [clip.skeleton.index(name) for name in part.joints]
+    if part.at < 0 or stop > len(clip) or observation.rotation[part.at : stop, joints].any():
+        raise RequestError(
+            f"the frames {part.at}:{stop} do not lie in a gap",
+            "joints of another clip can only be used where those of this one are missing",
+            "Move them with --at, take fewer with --from-range, or make the gap longer.",
+        )
+    for name in part.joints:
+        if _rests(clip, name, part.clip) > SAME:
+            raise RequestError(
+                f"{name} rests differently in the two clips",
+                "its rotations mean something else there",
+                "Use a clip of the same character.",
+            )
+
+
+def _rests(clip: Clip, name: str, other: Clip) -> float:
+    """How differently a joint rests in two clips, in radians: its own rotation, and its bones."""
+    one, two = clip.skeleton, other.skeleton
+    a, b = one.index(name), two.index(name)
+    worst = float(rotations.angle(one.rest_rotation[a], two.rest_rotation[b]))
+    for child, parent in enumerate(one.parents):
+        if parent == a and one.names[child] in two.names:
+            bones = [s.rest_translation[s.index(one.names[child])] for s in (one, two)]
+            worst = max(worst, float(rotations.angle(rotations.identity(), rotations.between(*bones))))
+    return worst

@@ -1,0 +1,72 @@
+"""Joints of another clip inside of a gap: the arm of a jump in a walk."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose.finish import measures
+from interpose.geometry import rotations
+from interpose.observation import Gap, Observation, Part
+from interpose.observation.part import lay
+
+ARM = ("RightArm", "RightForeArm", "RightHand")
+
+
+@pytest.fixture
+def part(data):  # type: ignore[no-untyped-def]
+    return Part(interpose.load(data / "cmu_jump.bvh"), 40, 48, 85, ARM)
+
+
+def turned_there(clip, part):  # type: ignore[no-untyped-def]
+    joints = [clip.skeleton.index(name) for name in part.joints]
+    return clip.rotation[part.at : part.at + part.stop - part.start, joints]
+
+
+@pytest.mark.parametrize("method", ["spline", "cae", "cmib"])
+def test_the_arm_is_the_other_s_and_the_body_the_method_s(cmu_walk, part, method):
+    done = interpose.fill(cmu_walk, "75:105", method=method, parts=part)
+    given = part.clip.rotation[40:48, [part.clip.skeleton.index(name) for name in ARM]]
+    assert turned_there(done.clip, part).tobytes() == given.tobytes()
+    outside = np.r_[0:75, 105:209]
+    assert done.clip.rotation[outside].tobytes() == cmu_walk.rotation[outside].tobytes()
+    plain = interpose.fill(cmu_walk, "75:105", method=method)
+    joints = [i for i, name in enumerate(cmu_walk.skeleton.names) if not name.startswith(("Right", "RThumb"))]
+    if {gap.method for gap in done.report.gaps} == {method}:
+        # Feet are held once more, on a body that hardly differs.
+        assert rotations.angle(done.clip.rotation, plain.clip.rotation)[:, joints].max() < 0.1
+    hand = cmu_walk.skeleton.index("RightHand")
+    jumps = measures.acceleration(done.clip.positions()[:, hand])[73:106]
+    own = measures.acceleration(part.clip.positions()[:, part.clip.skeleton.index("RightHand")])
+    assert jumps.max() < 1.5 * own.max(), "no harder than the other clip's arm itself"
+
+
+def test_what_the_gap_hid_has_no_influence(cmu_walk, part):
+    rotation = cmu_walk.rotation.copy()
+    rotation[75:105] = [0.5, -0.5, 0.5, 0.5]
+    poisoned = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    one, other = (interpose.fill(clip, "75:105", parts=[part]).clip for clip in (cmu_walk, poisoned))
+    assert one.rotation.tobytes() == other.rotation.tobytes()
+
+
+def test_parts_that_do_not_fit_are_refused(cmu_walk, part):
+    seen = Observation.from_gaps(cmu_walk, [Gap(75, 105)])
+    other = part.clip
+    legs = other.skeleton.rest_translation.copy()
+    legs[other.skeleton.index("RightHand")] = [0.0, 0.3, 0.0]
+    bent = replace(other, skeleton=replace(other.skeleton, rest_translation=legs))
+    for wrong, why in (
+        (replace(part, at=70), "do not lie in a gap"),
+        (replace(part, at=100), "do not lie in a gap"),
+        (replace(part, at=205), "do not lie in a gap"),
+        (replace(part, stop=500), "no frames 40:500"),
+        (replace(part, start=48), "no frames 48:48"),
+        (replace(part, joints=("RightWing",)), "RightWing"),
+        (replace(part, clip=replace(other, fps=60.0)), "different frame rates"),
+        (replace(part, clip=bent), "RightForeArm rests differently"),
+    ):
+        with pytest.raises(interpose.RequestError, match=why):
+            lay(cmu_walk, seen, [wrong])
