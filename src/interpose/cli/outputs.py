@@ -30,6 +30,7 @@ UNITS = {
     "foot_slide_before": "cm/s",
     "foot_travel": "m",
     "penetration": "cm",
+    "liveliness": "share of the motion around",
     "drift": "cm",
 }
 

@@ -6,6 +6,8 @@ import numpy as np
 
 # Height above the floor, in metres, at which a moving foot no longer counts as sliding (Zhang et al. 2018).
 SLIDE_HEIGHT = 0.025
+# Metres a second that joints move on average against the root of a body that is not still.
+STIRS = 0.15
 
 
 def joint_error(positions: np.ndarray, truth: np.ndarray) -> float:
@@ -54,6 +56,36 @@ def speed(positions: np.ndarray, fps: float) -> np.ndarray:
         return np.zeros(positions.shape[:-1])
     velocity = np.gradient(positions, axis=0) * fps
     return np.linalg.norm(velocity[..., [0, 2]], axis=-1)
+
+
+def liveliness(positions: np.ndarray, start: int, stop: int, fps: float) -> float | None:
+    """How much a body moves in the middle half of a gap, as a share of how much it moves around it.
+
+    The mean speed of joints relative to the first one, over the second before frame `start` and the second
+    from `stop` on. Long gaps of methods that say one answer tend to the mean of all possible ones, which
+    hardly moves (Kaufmann et al. 2020, section 4.2).
+
+    Args:
+        positions: (F, J, 3) metres, the root first.
+        start, stop: the gap is frames start to stop - 1.
+
+    Returns:
+        None for gaps under a second, with less than half a second of motion on a side, or amid stillness.
+    """
+    second = round(fps)
+    lo, hi = max(0, start - second), min(len(positions), stop + second)
+    if stop - start < second or min(start - lo, hi - stop) < second / 2:
+        return None
+    around = [_stir(positions[lo:start]), _stir(positions[stop:hi])]
+    if np.mean(around) * fps < STIRS:
+        return None
+    quarter = (stop - start) // 4
+    return float(_stir(positions[start + quarter : stop - quarter]) / np.mean(around))
+
+
+def _stir(positions: np.ndarray) -> float:
+    """Mean step in metres a frame of joints relative to the first one."""
+    return float(np.linalg.norm(np.diff(positions - positions[:, :1], axis=0), axis=-1).mean())
 
 
 def foot_slide(positions: np.ndarray, fps: float, floor: np.ndarray | None = None) -> float:

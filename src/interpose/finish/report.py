@@ -45,6 +45,8 @@ class GapReport:
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.
         penetration: cm, how deep the body goes into itself; a note says where if that is out of the ordinary.
+        liveliness: how much the body moves in the middle of the gap, as a share of how much around it; a note
+            says so where it hardly moves.
         drift: cm, of the root trajectory before it was spread over the gap.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
@@ -66,6 +68,7 @@ class GapReport:
     foot_slide_before: float | None = None
     foot_travel: float | None = None
     penetration: float | None = None
+    liveliness: float | None = None
     drift: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0
