@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -51,3 +53,31 @@ def test_the_table_of_actions_has_the_themes_that_are_there(published):
 def test_anchors_need_walks_or_runs(published):
     with pytest.raises(RequestError, match="neither walks nor runs"):
         conditions.anchors(published, [weights.find("cmib")], "test", most=1)
+
+
+def test_hdm05_is_judged_on_the_canonical_body(data, tmp_path):
+    """A trial in its layout and names; interpolation is better the shorter the way."""
+    folder = tmp_path / "hdm05"
+    head, *frames = re.split(r"^\d+\n", (data / "cmu_02_03.amc").read_text(), flags=re.MULTILINE)
+    there_and_back = [*frames, *frames[::-1]] * 10
+    trial = head + "".join(f"{i + 1}\n{frame}" for i, frame in enumerate(there_and_back[:400]))
+    for performer in ("bk", "mm"):
+        (folder / performer).mkdir(parents=True)
+        (folder / performer / f"HDM_{performer}.asf").write_bytes((data / "cmu_02.asf").read_bytes())
+        (folder / performer / f"HDM_{performer}_walk_001_120.amc").write_text(trial)
+    tables = conditions.hdm05(tmp_path, weights.find("cmib"), most=2)
+    assert [table.title.split(",")[0] for table in tables] == ["L2P", "L2Q"]
+    for table in tables:
+        assert list(table.rows) == ["interpolation", "cmib"]
+        assert all(0 < value < 20 for row in table.rows.values() for value in row)
+
+
+def test_a_cut_of_hdm05_turns_with_its_clip(sequence):
+    clip = sequence.slice(0, 40)
+    turn = rotations.about("Y", np.array(1.0))
+    rotation = clip.rotation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    turned = clip.with_motion(rotation, rotations.rotate(turn, clip.translation) - np.array([5.0, 0, 3]))
+    (placed, q), (other, r) = (conditions._Cut(one).see(one) for one in (clip, turned))
+    assert np.abs(placed - other).max() < 1e-6
+    assert np.abs(q - r).max() < 1e-6

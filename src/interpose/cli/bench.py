@@ -260,6 +260,34 @@ def actions(
     _print(result, json)
 
 
+@bench.command
+def hdm05(
+    *,
+    data: Path = Path("data"),
+    weights: Path | None = None,
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+) -> None:
+    """Kim et al. 2022, table 4: L2P and L2Q of CMIB on MPI-HDM05, which its weights have not seen.
+
+    Try:
+      interpose bench hdm05 --data data --split test
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cmib` wrote; the installed weights without.
+        split: validation (mm) for development, test (tr) for final figures.
+        most: cuts a length, spread over all of them; all without it.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.conditions import hdm05 as measure
+
+    with _bar() as progress:
+        result = measure(data, _trained([weights] if weights else [])[0], split, most, progress)
+    _print(result, json)
+
+
 def _trained(folders: list[Path]) -> list[Card]:
     """The weights of CMIB in some folders, or the installed ones."""
     from interpose.methods.weights import Card, find

@@ -405,7 +405,7 @@ def measure(
     truth_turned, truth = forward(windows.rotation[:, part], windows.root[:, part], windows.bones)
     start, extra = time.perf_counter(), []
     if method is None:
-        turned, placed = _global_lines(truth_turned, truth)
+        turned, placed = global_lines(truth_turned, truth)
     else:
         rotation, root = windows.rotation[:, part].copy(), windows.root[:, part].copy()
         first, last = (frame - part.start for frame in rules.hidden(gap))
@@ -439,7 +439,7 @@ def _told(method: Method, action: str) -> Method:
     return method
 
 
-def _global_lines(turned: np.ndarray, placed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def global_lines(turned: np.ndarray, placed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Straight lines of global positions, and SLERP of global rotations, between the ends."""
     share = np.linspace(0, 1, turned.shape[1])[None, :, None]
     lines = placed[:, :1] + share[..., None] * (placed[:, -1:] - placed[:, :1])
