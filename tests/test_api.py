@@ -102,3 +102,9 @@ def test_open_gaps_are_listed(cmu_walk):
     done = interpose.fill(cmu_walk, ["20:30", "100:160"], method="linear", max_gap=30)
     assert done.report.open == [interpose.Gap(100, 160)]
     np.testing.assert_array_equal(done.clip.rotation[30:], cmu_walk.rotation[30:])
+
+
+def test_clips_and_paths_are_stitched(cmu_walk, data):
+    done = interpose.stitch([cmu_walk, data / "cmu_run.bvh"], 12, method="linear")
+    assert len(done.clip) == 209 + 12 + 42
+    assert [laid.start for laid in done.clips] == [0, 221]

@@ -14,10 +14,11 @@ from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.finish import complete
+from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights
-from interpose.observation import Gap, Observation, Pin
+from interpose.observation import Gap, Observation, Pin, timeline
 
 METHODS = (*registry.names(), "auto")
 
@@ -279,3 +280,66 @@ def test_half_an_hour_takes_less_than_a_gigabyte(data):
         [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, check=True
     )
     assert int(done.stdout) < 1_000_000, "kilobytes"
+
+
+@pytest.fixture(scope="module")
+def stitched(cmu_walk, data):  # type: ignore[no-untyped-def]
+    takes = [cmu_walk, *(load(data / f"cmu_{name}.bvh") for name in ("run", "jump"))]
+    return tasks.stitch(takes)
+
+
+def test_nothing_pops_where_clips_are_stitched(stitched):
+    """At seams, and in the gaps by what the fill allows there; the feet do not slide."""
+    assert len(stitched.report.gaps) == 2
+    for gap in stitched.report.gaps:
+        jumps = 100 * np.linalg.norm(np.diff(stitched.clip.positions(), 2, axis=0), axis=-1).max(axis=1)
+        assert max(jumps[gap.start - 2], jumps[gap.stop - 1]) <= gap.seam_limit + 1e-6
+        assert jumps[gap.start - 1 : gap.stop - 1].max() <= gap.peak_limit
+        assert gap.foot_slide < 5
+    known = np.ones(len(stitched.clip), bool)
+    for gap in stitched.report.gaps:
+        known[gap.start : gap.stop] = False
+    assert not stitched.provenance[known].any()
+    assert (stitched.provenance[~known] > 0).all()
+
+
+@pytest.mark.parametrize("align", [True, False])
+def test_a_loop_comes_round_without_a_pop(cmu_walk, align):
+    """Three times round, each time placed as it says: no jump above the limit where it begins again."""
+    done = tasks.stitch([cmu_walk], align=align, loop=True)
+    assert done.loop is not None
+    laps, placed = [], done.clip
+    for _ in range(3):
+        laps.append(placed.positions())
+        placed = done.loop.placement.of(placed)
+    jumps = 100 * np.linalg.norm(np.diff(np.concatenate(laps), 2, axis=0), axis=-1).max(axis=1)
+    for start in (len(done.clip), 2 * len(done.clip)):
+        assert jumps[start - 1] == pytest.approx(done.loop.jump, abs=1e-3)
+        assert jumps[start - 1] <= done.loop.limit
+        assert jumps[start - 2] <= done.report.gaps[-1].peak_limit
+    if not align:  # it comes back to where it began
+        assert done.loop.placement == timeline.Placement()
+    assert len(done.raw.clip) == len(done.clip) == len(done.provenance) == done.report.gaps[-1].stop
+
+
+def test_a_walk_that_loops_walks_on(data):
+    """Forty times two steps: as far as the pace leads, not on the spot."""
+    walk = load(data / "cmu_walk.bvh").slice(10, 65)
+    done = tasks.stitch([walk], loop=True)
+    assert done.loop is not None
+    way = np.hypot(*done.loop.placement.shift[::2])
+    assert done.loop.placement.yaw == pytest.approx(0, abs=0.4)
+    begun, ended = (np.linalg.norm((p[1] - p[0])[[0, 2]]) for p in (walk.root[[0, 15]], walk.root[[-16, -1]]))
+    assert np.linalg.norm((done.loop.placement.of(walk).root[0] - walk.root[-1])[[0, 2]]) == pytest.approx(
+        (begun + ended) / 30 * (len(done.clip) - len(walk) + 1), rel=0.05
+    )
+    assert way > 1
+
+
+def test_other_values_of_the_clips_do_not_reach_each_other(cmu_walk):
+    """Turning and moving a following clip changes nothing."""
+    first, second = cmu_walk.slice(0, 80), cmu_walk.slice(120, 209)
+    moved = timeline.Placement(1.9, (40.0, 0.0, -3.0)).of(second)
+    one, other = (tasks.stitch([first, clip]) for clip in (second, moved))
+    assert len(one.clip) == len(other.clip)
+    assert np.abs(one.clip.positions() - other.clip.positions()).max() < 1e-3

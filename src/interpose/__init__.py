@@ -12,7 +12,7 @@ half-open. Nothing heavy is imported before it is used.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from interpose.methods.registry import names as method_names
     from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.scan import scan
+    from interpose.tasks import Stitched
 
 __version__ = "0.1.0"
 
@@ -42,12 +43,14 @@ __all__ = [
     "Skeleton",
     "__version__",
     "between",
+    "denoise",
     "fill",
     "load",
     "method_names",
     "recover",
     "save",
     "scan",
+    "stitch",
 ]
 
 # Where each public name lives: PEP 562, so that `import interpose` costs next to nothing.
@@ -94,6 +97,7 @@ def fill(
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     parts: Part | Sequence[Part] = (),
+    path: Mapping[int, Any] | None = None,
 ) -> Completion:
     """Fill gaps of a clip; what is observed comes back unchanged, bit for bit.
 
@@ -108,6 +112,7 @@ def fill(
         seed: for methods that sample.
         progress: called with the share done, 0 to 1.
         parts: poses of single joints that other clips give inside of the gaps.
+        path: floor points (x and z in metres) that the root is led over, by frame: {130: (1.2, 0.4)}.
 
     Returns:
         The completion: `.clip`, `.report` (one entry a gap; `.report.open` lists what was left), `.raw` and
@@ -135,7 +140,7 @@ def fill(
         wanted = gaps if isinstance(gaps, Observation) else [_gap(gap) for gap in _several(gaps)]
     given = [parts] if isinstance(parts, Part) else list(parts)
     return tasks.fill(
-        clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress, parts=given
+        clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress, parts=given, path=path
     )
 
 
@@ -171,6 +176,43 @@ def recover(
     )
 
 
+def denoise(
+    clip: Clip | str | Path,
+    strength: float = 1.0,
+    *,
+    joints: str | Sequence[str] | None = None,
+    frames: str | tuple[int, int] | None = None,
+) -> Completion:
+    """Smooth noise, and fill values that were lost: joints that snap to their rest pose, spikes.
+
+    How noisy the clip is, is estimated from it, joint by joint, so that a clean one hardly changes. Bones
+    keep their lengths, and no frame is lost.
+
+    Args:
+        clip: a clip, or the path of one.
+        strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
+        joints: names of the joints that may turn, of a root that moves, too; None for all.
+        frames: "120:160" or (120, 160); the noise is estimated from these. None for all.
+
+    Returns:
+        The completion: `.report.noise` says how noisy the clip was and what was done, `.provenance` where
+        values were smoothed or filled.
+
+    Raises:
+        RequestError: too few frames, a strength below zero, a joint or range that does not exist.
+        FileError: the file cannot be read.
+    """
+    from interpose import tasks
+
+    chosen = _gap(frames) if frames is not None else None
+    return tasks.denoise(
+        _clip(clip),
+        strength,
+        [joints] if isinstance(joints, str) else joints,
+        (chosen.start, chosen.stop) if chosen else None,
+    )
+
+
 def between(
     clip: Clip | str | Path,
     keys: Sequence[int],
@@ -195,6 +237,47 @@ def between(
     from interpose import tasks
 
     return tasks.between(_clip(clip), keys, action, method, seed, progress)
+
+
+def stitch(
+    clips: Sequence[Clip | str | Path],
+    frames: str | int | Sequence[int] = "auto",
+    action: str = "",
+    *,
+    align: bool = True,
+    loop: bool = False,
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Stitched:
+    """Lay clips one after another on one timeline, and generate the motion that leads from each to the next.
+
+    All frames of the clips are kept, at the frame rate and on the skeleton of the first one. The first one
+    stays where it is; following ones are turned about the vertical and shifted over the floor as a whole.
+
+    Args:
+        clips: clips or paths, on skeletons with the same joints; one is enough for a loop.
+            `clip.slice(12, 80)` is a part of one.
+        frames: how many frames to generate: one number, or one for each gap; "auto" chooses what is
+            unhurried.
+        action: what the motion in the gaps is ("walk", ...): asks for the method "cmib".
+        align: each following clip heads on where the one before it was heading, as far ahead as their paces
+            lead. Without it clips stay where they lie.
+        loop: one more gap leads back to the beginning, so that the motion can be played round and round.
+        method, seed, progress: as in `fill`.
+
+    Returns:
+        What `fill` does; `.clip` is the whole timeline, and `.report` counts in its frames. `.clips` tells
+        where each clip lies, and `.loop` how a loop closes.
+
+    Raises:
+        RequestError: nothing to stitch, an empty clip, other skeletons, lengths that do not fit, and what
+            `fill` refuses.
+        FileError: a file cannot be read.
+    """
+    from interpose import tasks
+
+    return tasks.stitch([_clip(clip) for clip in clips], frames, align, loop, action, method, seed, progress)
 
 
 def _clip(clip: Clip | str | Path) -> Clip:

@@ -15,21 +15,21 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, seams
+from interpose.finish.denoise import denoised
 from interpose.finish.guarantees import check_pins
+from interpose.finish.measures import acceleration
+from interpose.finish.path import spans as path_spans
 from interpose.finish.windows import ramp, runs
 from interpose.geometry import rotations
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method, Raw
-from interpose.observation import Gap, Observation, Part
+from interpose.observation import Gap, Observation, Part, timeline
 from interpose.observation.part import lay
 from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
-STANDS = 0.4  # metres a second: who is slower does not go anywhere
-PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
-TURN = 180.0  # degrees a second: an unhurried turn of a joint
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ def fill(
     progress: Callable[[float], None] | None = None,
     action: str = "",
     parts: Sequence[Part] = (),
+    path: Mapping[int, Any] | None = None,
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
 
@@ -68,13 +69,14 @@ def fill(
         progress: called with the share done, 0 to 1.
         action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
         parts: poses of single joints that other clips give inside of the gaps.
+        path: x and z in metres that the root is led over, by frame; inside of gaps of the whole pose.
 
     Returns:
         The completion; `report.open` lists the gaps left open.
 
     Raises:
         RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
-            observed; a part that does not fit.
+            observed; a part that does not fit; a path outside of the gaps.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     check_pins(observation)
@@ -86,6 +88,7 @@ def fill(
             "Leave at least one frame out of the gaps.",
         )
     whole, clip = clip, _handed(clip, observation)
+    path_spans(clip, observation, path or ())
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
@@ -97,7 +100,9 @@ def fill(
         assert job.method is not None
         margin = round(CONTEXT * clip.fps)
         lo, hi = max(0, start - margin), min(len(clip), stop + margin)
-        part = complete(clip.slice(lo, hi), observation.slice(lo, hi), job.method, seed, limit=limit)
+        way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if start <= f < stop}
+        window, seen = clip.slice(lo, hi), observation.slice(lo, hi)
+        part = complete(window, seen, job.method, seed, limit=limit, path=way, first=lo)
         fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
         inside = slice(start - lo, stop - lo)
         _paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
@@ -143,6 +148,36 @@ def recover(
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
+def denoise(
+    clip: Clip,
+    strength: float = 1.0,
+    joints: Sequence[str] | None = None,
+    frames: tuple[int, int] | None = None,
+) -> Completion:
+    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
+
+    Args:
+        clip: what is observed but not fully trusted.
+        strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
+        joints: the joints that may turn, roots among them that move, too; None for all.
+        frames: the range in which anything may change, from which the noise is estimated, too.
+
+    Raises:
+        RequestError: too few frames, a strength below zero, a joint or range that does not exist.
+    """
+    if not (np.isfinite(strength) and strength >= 0):
+        raise RequestError(
+            f"cannot denoise with strength {strength:g}",
+            "the estimated noise is multiplied with it",
+            "Choose 0 or more: 1 trusts the estimate, 2 smooths more.",
+        )
+    start, stop = frames or (0, len(clip))
+    if frames is not None:
+        Gap(start, stop).check(len(clip))
+    chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
+    return denoised(clip, strength, chosen, start, stop)
+
+
 def between(
     clip: Clip,
     keys: Sequence[int],
@@ -180,30 +215,6 @@ def between(
     return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
 
 
-def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[int, str]:
-    """How many frames a motion takes from frame `last` of one clip to frame `first` of another, and why.
-
-    As long as the hips need for the way at the pace of the two clips (of the second beside the pose; people
-    who stand set off at PACE), or, if that is longer, as the joint that has furthest to turn needs at TURN.
-    """
-    fps = start.fps
-    here, there = start.root[last], target.root[first]
-    way = float(np.linalg.norm((there - here)[[0, 2]]))
-    paces = []
-    for clip, frame in ((start, last), (target, first)):
-        lo, hi = max(0, frame - round(clip.fps)), min(len(clip), frame + round(clip.fps) + 1)
-        steps = np.linalg.norm(np.diff(clip.root[lo:hi, [0, 2]], axis=0), axis=1) * clip.fps
-        paces.append(float(steps.mean()) if len(steps) else 0.0)
-    pace = max(paces) if max(paces) > STANDS else PACE
-    turns = np.degrees(rotations.angle(start.rotation[last], target.rotation[first]))
-    joint = int(turns.argmax())
-    by_way, by_turn = way / pace, float(turns[joint]) / TURN
-    count = max(1, round(max(by_way, by_turn) * fps) - 1)
-    if by_way >= by_turn:
-        return count, f"{way:.2f} m at {pace:.1f} m/s"
-    return count, f"{start.skeleton.names[joint]} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"
-
-
 def block(poses: Mapping[int, Clip]) -> Clip:
     """A clip from poses by frame: the key frames that `between` goes by. Each pose holds until the next.
 
@@ -229,6 +240,74 @@ def block(poses: Mapping[int, Clip]) -> Clip:
         for name in ("rotation", "translation")
     )
     return first.with_motion(rotation, translation)
+
+
+@dataclass(frozen=True)
+class Loop:
+    """How a motion that goes round meets its beginning.
+
+    Attributes:
+        placement: how the whole motion is turned and shifted each time it comes round.
+        why: what decided the length of the last gap, where nobody said it.
+        jump, limit: cm a frame squared, the largest velocity jump of any joint at frame 0, so placed, after
+            the last two frames; and the 95th percentile of the motion's own.
+    """
+
+    placement: timeline.Placement
+    why: str
+    jump: float | None
+    limit: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Stitched(Completion):
+    """A completion that tells where each clip lies on the timeline, and of a loop how it closes."""
+
+    clips: list[timeline.Laid]
+    loop: Loop | None = None
+
+
+def stitch(
+    clips: Sequence[Clip],
+    frames: str | int | Sequence[int] = "auto",
+    align: bool = True,
+    loop: bool = False,
+    action: str = "",
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Stitched:
+    """Lay clips one after another on one timeline, and generate the motion that leads from each to the next.
+
+    All frames of the clips are kept; following ones are placed as a whole (`timeline.lay`). Of a loop the
+    beginning is laid at the end once more, as what the last gap leads to, and then taken away again.
+
+    Args:
+        clips, frames, align, loop: as in `timeline.lay`.
+        action, method, seed, progress: as in `fill`.
+
+    Raises:
+        RequestError: what `timeline.lay` and `fill` refuse.
+    """
+    line = timeline.lay(clips, frames, align, loop)
+    done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
+    clip, provenance, closing = done.clip, done.provenance, None
+    if line.again is not None:
+        start, last = line.again.start, done.report.gaps[-1]
+        around = acceleration(clip.slice(start - 1, start + 2).positions())
+        jump = 100 * float(around.max()) if around.size else None
+        closing = Loop(line.again.placement, line.again.why, jump, last.seam_limit)
+        clip = clip.with_motion(clip.rotation[:start], clip.translation[:start])
+        provenance = provenance[:start]
+    return Stitched(
+        clip, lambda: _until(done.raw, len(clip)), provenance, done.report, clips=line.laid, loop=closing
+    )
+
+
+def _until(raw: Raw, stop: int) -> Raw:
+    """What a method said of the frames before `stop`."""
+    positions, own = (None if some is None else some[:stop] for some in (raw.positions, raw.own))
+    return replace(raw, clip=raw.clip.slice(0, stop), positions=positions, own=own)
 
 
 def plan(

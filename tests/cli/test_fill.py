@@ -341,3 +341,33 @@ def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data
     assert (
         "--from-range 4-8" in run(*words, *given[:2], "--from-range", "4-8", "--at", "70", "-o", "x.bvh").err
     )
+
+
+def test_a_path_is_in_the_file_s_own_unit_and_its_report_is_replayed(run, take):
+    clip = load(take)
+    unit = clip.source.unit
+    x, _, z = clip.root[75] / unit
+    done = run("fill", "take.bvh", "--gap", "60:90", "--path", f"75:{x:.4f},{z + 2:.4f}", "--json")
+    assert done.code == 0
+    assert done.json["path"] == [f"75:{x:.4f},{z + 2:.4f}"]
+    assert done.json["gaps"][0]["path"] < 1
+    there = load(take.with_name("take.filled.bvh")).root[75]
+    assert np.abs(there - clip.root[75] - [0, there[1] - clip.root[75, 1], 2 * unit]).max() < 0.01
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh").code == 0
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+
+
+@pytest.mark.parametrize("text", ["75", "75:1", "75:1,nan", "75:1,2,3", "a:1,2", "75:1,"])
+def test_a_path_that_cannot_be_read(run, take, text):
+    done = run("fill", "take.bvh", "--gap", "60:90", "--path", text)
+    assert done.code == 2
+    assert f"cannot read --path {text}" in done.err
+    assert "x and z" in done.err
+
+
+def test_a_path_in_a_file_with_z_up(run, take):
+    from interpose.cli.request import path_of
+
+    clip = load(take, up="z")
+    (point,) = path_of(["75:3,4"], clip).values()
+    assert np.allclose(point, np.array([3.0, -4.0]) * clip.source.unit), "x and y of the file"

@@ -33,6 +33,8 @@ def test_the_report_says_that_a_gap_is_a_mean_pose(cmu_walk):
     (report,) = complete(cmu_walk, seen, still, fallback=still).report.gaps
     assert report.liveliness < 0.33
     assert any("A key near frame" in note for note in report.notes)
+    (report,) = complete(cmu_walk, seen, still, fallback=still, first=500).report.gaps
+    assert any("A key near frame 605 says" in note for note in report.notes), "as the whole clip counts"
     (report,) = complete(cmu_walk, seen, registry.get("cae")).report.gaps
     assert report.liveliness > 0.33
     assert not any("A key near" in note for note in report.notes)

@@ -50,6 +50,8 @@ def test_an_arm_through_the_trunk_is_said_and_real_motion_is_not(cmu_walk, throu
     assert "left forearm" in words
     assert "into the trunk at frame" in words
     assert 60 <= int(words.split()[-1]) < 80
+    window = through(cmu_walk).slice(40, 100)
+    assert deepest(window, 10, 50, first=40)[1] == words
     assert deepest(through(cmu_walk), 70, 78)[1] == "", "as deep in the frames beside it"
 
 

@@ -98,12 +98,13 @@ def _blocked(
     """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip, and
     a line for the user where the length was proposed."""
     from interpose import tasks
+    from interpose.observation.timeline import plausible_length
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
     said = ""
     if frames == "auto":
-        count, why = tasks.plausible_length(before, last, after, first)
+        count, why = plausible_length(before, last, after, first)
         said = f"{count} frames: {why}"
     elif frames.isdecimal() and int(frames) > 0:
         count = int(frames)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -29,6 +29,7 @@ def fill(
     from_: Annotated[Path | None, Parameter(name="--from")] = None,
     from_range: str | None = None,
     at: int | None = None,
+    path: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str | None = None,
     max_gap: int | None = None,
@@ -64,6 +65,8 @@ def fill(
         from_: another clip of the same character that gives poses of the --joints inside of a gap.
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
+        path: FRAME:A,B, a point of the floor that the hips are led over at that frame of a gap, in the file's
+            own unit and axes (x and z where Y is up, x and y where Z is up). May be repeated.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         max_gap: leave gaps of more than this many frames open, and list them.
@@ -75,12 +78,21 @@ def fill(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method, from_options, part_of, parts_to_dict, reading_of, roles_of
+    from interpose.cli.request import (
+        check_method,
+        from_options,
+        part_of,
+        parts_to_dict,
+        path_of,
+        reading_of,
+        roles_of,
+    )
 
     clip = reading_of(gaps, reading).load(file, roles_of(gaps))
     parts = part_of(from_, from_range, at, joints, reading)
     request = from_options(file, clip, gap, [] if parts else joints, gaps, reading)
-    request = replace(request, parts=request.parts + parts)
+    request = replace(request, parts=request.parts + parts, path=request.path + path)
+    points = path_of(request.path, clip)
     if method is not None:
         check_method(method)
         request = replace(request, method=method, methods={})
@@ -108,9 +120,11 @@ def fill(
             progress=advance,
             action=request.action,
             parts=[part for _, part in request.parts],
+            path=points,
         )
     why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
-    more = {"parts": parts_to_dict(request.parts)} if request.parts else {}
+    more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
+    more |= {"path": request.path} if request.path else {}
     return finish(
         "fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force, more=more
     )

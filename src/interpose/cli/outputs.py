@@ -31,6 +31,7 @@ UNITS = {
     "foot_travel": "m",
     "penetration": "cm",
     "liveliness": "share of the motion around",
+    "path": "cm",
     "drift": "cm",
 }
 
@@ -218,13 +219,13 @@ def write(
 
 
 def compare(clip: Clip, completion: Completion, title: str) -> str:
-    """A page that plays the clip as it was, faintly, and as it is now."""
+    """A page that plays the clip as it was, faintly, and as it is now; once, if that is all there is."""
     from interpose.show import Take, player
 
-    takes = [
-        Take("filled", completion.clip.positions(), "#d1495b"),
-        Take("input", clip.positions(), "#6b7280", ghost=True),
-    ]
+    done = "filled" if completion.report.noise is None else "denoised"
+    takes = [Take(done, completion.clip.positions(), "#d1495b")]
+    if clip is not completion.clip:
+        takes.append(Take("input", clip.positions(), "#6b7280", ghost=True))
     gaps = [(gap.start, gap.stop) for gap in completion.report.gaps]
     text, names_ = str(completion.report), clip.skeleton.names
     return player(takes, clip.skeleton.parents, clip.fps, gaps, title=title, report=text, names=names_)

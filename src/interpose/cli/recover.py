@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 from cyclopts import Parameter
 
@@ -11,9 +11,6 @@ from interpose.cli.console import progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
-
-if TYPE_CHECKING:
-    from interpose.observation import Gap
 
 
 def recover(
@@ -51,7 +48,7 @@ def recover(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method
+    from interpose.cli.request import check_method, range_of
     from interpose.observation import Gap
 
     chosen = split_names(joints)
@@ -61,7 +58,7 @@ def recover(
         )
     check_method(method)
     clip = reading.load(file)
-    gap = _range(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
+    gap = range_of(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
     for name in chosen:
         clip.skeleton.index(name)
@@ -71,12 +68,3 @@ def recover(
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
     return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
 
-
-def _range(text: str, joints: tuple[str, ...]) -> Gap:
-    from interpose.observation import Gap
-
-    try:
-        return Gap.parse(text, joints)
-    except RequestError as error:
-        fix = "Write --frames 120:160 for the frames 120 to 159."
-        raise RequestError(f"cannot read --frames {text}", error.why.replace("a gap", "it"), fix) from None

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
 from interpose.errors import RequestError, unknown
+from interpose.formats.place import vectors_inside
 from interpose.observation import Gap, Part
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import scan, to_gaps
@@ -28,6 +32,7 @@ class Request:
         said: lines for the user: where the gaps come from.
         action: what the motion is, for methods that know actions.
         parts: poses of single joints from other clips, each with the path of its clip.
+        path: points of the floor, as they were written.
     """
 
     gaps: list[Gap]
@@ -39,6 +44,7 @@ class Request:
     said: str = ""
     action: str = ""
     parts: list[tuple[Path, Part]] = field(default_factory=list)
+    path: list[str] = field(default_factory=list)
 
 
 def from_options(
@@ -136,6 +142,38 @@ def _frames(text: str) -> Gap:
         ) from None
 
 
+def range_of(text: str, joints: tuple[str, ...] | None = None) -> Gap:
+    """The gap that --frames names; RequestError when it cannot be read."""
+    try:
+        return Gap.parse(text, joints)
+    except RequestError as error:
+        fix = "Write --frames 120:160 for the frames 120 to 159."
+        raise RequestError(f"cannot read --frames {text}", error.why.replace("a gap", "it"), fix) from None
+
+
+def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
+    """Points "FRAME:A,B" of --path, in the file's own unit and floor axes: x and z in metres by frame."""
+    unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
+    floor = ["xyz".index(axis) for axis in "xyz" if axis != up[-1]]
+    points = {}
+    for text in texts:
+        match = re.fullmatch(r"(\d+):([^,]+),([^,]+)", text)
+        try:
+            where = np.zeros(3)
+            where[floor] = [float(number) for number in match.groups()[1:]] if match else np.nan
+        except ValueError:
+            where[:] = np.nan
+        if match is None or not np.isfinite(where).all():
+            names = " and ".join("xyz"[axis] for axis in floor)
+            raise RequestError(
+                f"cannot read --path {text}",
+                f"a point is a frame and two coordinates on the floor, {names}, in the file's own unit",
+                "Write for example --path 130:120.5,-40.",
+            )
+        points[int(match[1])] = vectors_inside(where, unit, up)[[0, 2]]
+    return points
+
+
 def parts_to_dict(parts: list[tuple[Path, Part]]) -> list[dict[str, Any]]:
     """For a report, so that it can be replayed."""
     return [
@@ -172,6 +210,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Rea
         f"as in {path}",
         str(content.get("action", "")),
         parts,
+        list(content.get("path", [])),
     )
 
 

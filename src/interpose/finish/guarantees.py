@@ -5,6 +5,7 @@ Precedence when they collide: observed values, then bones, then seams, then feet
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,6 +15,7 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import feet, measures, penetration, seams
 from interpose.finish.loose import Layer, loose, without
+from interpose.finish.path import follow, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow, runs
@@ -27,6 +29,8 @@ NOWHERE = 1e4
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
 # pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
 DULL = 0.33
+# A path on which the root goes this much further than without it is said to be too long.
+FURTHER = 1.5
 # Frames solved at once.
 CHUNK = 4096
 # Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
@@ -74,6 +78,8 @@ def complete(
     seed: int | None = None,
     fallback: Method | None = None,
     limit: float | None = None,
+    path: Mapping[int, np.ndarray] | None = None,
+    first: int = 0,
 ) -> Completion:
     """Complete a clip by a method, and make the result usable.
 
@@ -89,9 +95,12 @@ def complete(
         fallback: the simpler method.
         limit: metres per frame squared, the largest velocity jump allowed at a seam, when `clip` is a window
             of a longer one. Default: the 95th percentile of the clip's own.
+        path: x and z in metres that the root is to be over, by frame; inside of gaps of the whole pose.
+        first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
     Raises:
-        RequestError: the observation does not fit the clip or has pins, or nothing fills a gap.
+        RequestError: the observation does not fit the clip or has pins, nothing fills a gap, or a point of
+            the path lies in no gap of the whole pose with known frames on both sides.
     """
     if observation.rotation.shape != clip.rotation.shape[:2]:
         raise RequestError(
@@ -103,6 +112,8 @@ def complete(
     check_pins(observation)
     hidden = wipe(clip, observation)
     known = _trusted(hidden, observation)
+    if path:
+        return _along(path, clip, observation, known, method, seed, fallback, limit, first)
     hanging = loose(hidden, known)
     if hanging.any() and not isinstance(method, Layer):
         body = complete(clip, without(observation, hanging), method, seed, fallback, limit)
@@ -135,7 +146,7 @@ def complete(
             _fade(current, source, hidden, known, span)
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
-            if source is not opinion or not isinstance(method, Layer):  # a layer's body stands already
+            if source is not opinion or not (isinstance(method, Layer) and method.stands):
                 _plant(current, known, span, bounds)
         for _ in range(ROUNDS):
             for span in chosen:
@@ -190,11 +201,56 @@ def complete(
             unheld.get(gap),
             held.get(gap),
             method.name,
+            first,
         )
         for gap in gaps
     ]
     provenance = _provenance(known, spans, method.name, opinion, finished)
     return Completion(finished, lambda: raw, provenance, Report(method.name, reports))
+
+
+def _along(
+    path: Mapping[int, np.ndarray],
+    clip: Clip,
+    observation: Observation,
+    known: Observation,
+    method: Method,
+    seed: int | None,
+    fallback: Method,
+    limit: float | None,
+    first: int,
+) -> Completion:
+    """Complete a clip, lead the root along the path, and make the result usable once more."""
+    gaps = spans(clip, known, path)
+    done = complete(clip, observation, method, seed, fallback, limit)
+    led = body = done.clip
+    for start, stop in gaps:
+        if points := {frame: point for frame, point in path.items() if start <= frame < stop}:
+            led = follow(led, start, stop, points)
+    nothing = np.zeros_like(known.rotation)
+    names = {gap.method for gap in done.report.gaps}
+    layer = Layer(names.pop() if len(names) == 1 else method.name, led, done.raw, nothing, stands=False)
+    done = complete(clip, observation, layer, seed, layer, limit, first=first)
+
+    def judged(gap: GapReport) -> GapReport:
+        off = [done.clip.root[f, [0, 2]] - p for f, p in path.items() if gap.start <= f < gap.stop]
+        if not off:
+            return gap
+        missed = 100 * float(np.linalg.norm(off, axis=1).max())
+        notes = [f"the path is met within {missed:.1f} cm"]
+        own, new = (
+            np.linalg.norm(np.diff(c.root[gap.start - 1 : gap.stop + 1, [0, 2]], axis=0), axis=1).sum()
+            for c in (body, done.clip)
+        )
+        if new > FURTHER * own:
+            notes.append(
+                f"flagged: its way of {new:.1f} m is {new / own:.1f} times as long as without the path, and "
+                "steps are too short for it. A longer gap or a nearer point helps"
+            )
+        return replace(gap, path=missed, notes=(*gap.notes, *notes))
+
+    reports = [judged(gap) for gap in done.report.gaps]
+    return replace(done, report=replace(done.report, gaps=reports))
 
 
 def check_pins(observation: Observation) -> None:
@@ -423,6 +479,7 @@ def _report(
     unheld: tuple[float, float] | None,
     held: tuple[float, float] | None,
     method: str,
+    first: int,
 ) -> GapReport:
     part = finished.slice(gap.start, gap.stop)
     own = span.method == method
@@ -431,7 +488,7 @@ def _report(
     lengths[list(finished.translated)] = np.nan
     after = _jump(finished, known, _at(gap))
     alive = None if gap.joints is not None else _liveliness(finished, gap)
-    inside = penetration.deepest(finished, gap.start, gap.stop)
+    inside = penetration.deepest(finished, gap.start, gap.stop, first)
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,
@@ -455,7 +512,7 @@ def _report(
         notes=(
             *span.notes,
             *((inside[1],) if inside and inside[1] else ()),
-            *((_dull(alive, gap),) if alive is not None and alive < DULL else ()),
+            *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
     )
@@ -469,10 +526,10 @@ def _liveliness(finished: Clip, gap: Gap) -> float | None:
     )
 
 
-def _dull(alive: float, gap: Gap) -> str:
+def _dull(alive: float, gap: Gap, first: int) -> str:
     return (
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
-        f"possible motions. A key near frame {(gap.start + gap.stop) // 2} says which one is meant"
+        f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
     )
 
 

@@ -35,12 +35,16 @@ def without(observation: Observation, some: np.ndarray) -> Observation:
 
 @dataclass
 class Layer:
-    """A method's completion of the body with the loose joints (F, J) laid on it."""
+    """A finished completion of the body as a method, with the loose joints (F, J) laid on it.
+
+    `stands`: its feet have been held already, and it has not been moved since.
+    """
 
     name: str
     body: Clip
     raw: Raw
     joints: np.ndarray
+    stands: bool = True
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Never: the body is there already."""

@@ -45,6 +45,7 @@ PAIRS = (
     ("left shin", "right thigh"),
 )
 LIMIT = 0.05  # metres: deeper is worth a word
+BESIDE = 60  # frames on both sides that are looked at as well
 
 
 def segment_distance(p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -81,13 +82,14 @@ def depths(skeleton: Skeleton, positions: np.ndarray) -> tuple[list[tuple[str, s
     return pairs, np.maximum(found, 0.0)
 
 
-def deepest(clip: Clip, start: int, stop: int, beside: int = 60) -> tuple[float, str] | None:
+def deepest(clip: Clip, start: int, stop: int, first: int = 0) -> tuple[float, str] | None:
     """How deep a body goes into itself from frame start to stop - 1 (metres), and a sentence on it.
 
-    The sentence is empty within LIMIT, and where the same two parts are as deep in the frames `beside`: some
-    skeletons and performers are stouter than others. None for skeletons without such parts.
+    The sentence is empty within LIMIT, and where the same two parts are as deep BESIDE: some skeletons and
+    performers are stouter than others. It calls the first frame of the clip `first`. None for skeletons
+    without such parts.
     """
-    lo, hi = max(0, start - beside), min(len(clip), stop + beside)
+    lo, hi = max(0, start - BESIDE), min(len(clip), stop + BESIDE)
     pairs, found = depths(clip.skeleton, clip.slice(lo, hi).positions())
     if not pairs:
         return None
@@ -98,7 +100,5 @@ def deepest(clip: Clip, start: int, stop: int, beside: int = 60) -> tuple[float,
     if depth <= LIMIT or depth <= around.max(initial=0.0):
         return depth, ""
     one, other = pairs[pair]
-    return (
-        depth,
-        f"flagged: the {one} goes {100 * depth:.0f} cm into the {other} at frame {start + int(frame)}",
-    )
+    where = f"at frame {first + start + int(frame)}"
+    return depth, f"flagged: the {one} goes {100 * depth:.0f} cm into the {other} {where}"

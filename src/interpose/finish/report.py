@@ -23,6 +23,7 @@ class Provenance(IntEnum):
     METHOD = 1  # what the method said (solved, where it speaks positions)
     CORRECTED = 2  # the method's, changed by seams or feet
     FALLBACK = 3  # the simpler method's
+    SMOOTHED = 4  # observed, but not fully trusted
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ class GapReport:
         penetration: cm, how deep the body goes into itself; a note says where if that is out of the ordinary.
         liveliness: how much the body moves in the middle of the gap, as a share of how much around it; a note
             says so where it hardly moves.
+        path: cm, by how much the root misses points of the path that was asked for.
         drift: cm, of the root trajectory before it was spread over the gap.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
@@ -69,6 +71,7 @@ class GapReport:
     foot_travel: float | None = None
     penetration: float | None = None
     liveliness: float | None = None
+    path: float | None = None
     drift: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0
@@ -96,20 +99,78 @@ class GapReport:
 
 
 @dataclass(frozen=True)
+class JointNoise:
+    """What denoising found of one joint and did to it: its name, noise and movement as in `NoiseReport`, and
+    the frames START:STOP in which its value was broken."""
+
+    joint: str
+    noise: float
+    moved: float
+    moved_most: float
+    broken: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class NoiseReport:
+    """What denoising found and did.
+
+    Attributes:
+        start, stop: frames start to stop - 1 were looked at.
+        strength: what the estimated noise was multiplied with.
+        noise: cm, the estimated standard deviation of the joints' positions along an axis, in the mean.
+        moved, moved_most: cm, how far joints moved, in the mean and at most.
+        broken: how many values of joints were judged broken, and filled.
+        values: how many there are: frames times joints.
+        joints: each joint.
+    """
+
+    start: int
+    stop: int
+    strength: float
+    noise: float
+    moved: float
+    moved_most: float
+    broken: int
+    values: int
+    joints: tuple[JointNoise, ...] = field(repr=False)
+
+    def __str__(self) -> str:
+        shakiest = max(self.joints, key=lambda one: one.noise)
+        furthest = max(self.joints, key=lambda one: one.moved_most)
+        lossy = [one.joint for one in self.joints if one.broken]
+        where = f", in {', '.join(lossy[:4])}" + f" +{len(lossy) - 4}" * (len(lossy) > 4) if lossy else ""
+        return "\n".join(
+            [
+                f"noise: {self.noise:.2f} cm along each axis, estimated (most: {shakiest.joint}, "
+                f"{shakiest.noise:.2f} cm)",
+                f"broken: {self.broken:,} of {self.values:,} joint rotations or positions{where}"
+                + "; filled" * (self.broken > 0 and self.strength > 0),
+                f"moved: joints by {self.moved:.2f} cm in the mean, at most by {self.moved_most:.2f} cm "
+                f"({furthest.joint})",
+            ]
+        )
+
+
+@dataclass(frozen=True)
 class Report:
-    """The filled gaps of a clip in order of time, those left open, and the action that was asked for."""
+    """The filled gaps of a clip in order of time, those left open, the action that was asked for, and what
+    denoising has to say."""
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
     open: list[Gap] = field(default_factory=list)
     action: str = ""
+    noise: NoiseReport | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
         gaps, left = ([_plain(asdict(gap)) for gap in some] for some in (self.gaps, self.open))
-        return {"method": self.method, "action": self.action, "gaps": gaps, "open": left}
+        noise = {} if self.noise is None else {"denoised": _plain(asdict(self.noise))}
+        return {"method": self.method, "action": self.action, "gaps": gaps, "open": left, **noise}
 
     def __str__(self) -> str:
+        if self.noise is not None:
+            return str(self.noise)
         lines = [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
         return "\n".join(lines) or "nothing is missing"
 

@@ -1,0 +1,74 @@
+"""interpose denoise: noise, and values that were lost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from interpose.cli.console import progress, say, say_json
+from interpose.cli.outputs import Outputs, to_json, write
+from interpose.cli.reading import Reading, describe, split_names
+from interpose.errors import RequestError
+
+UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm"}
+
+
+def denoise(
+    file: Path,
+    /,
+    *,
+    strength: float = 1.0,
+    joints: list[str] = [],  # noqa: B006
+    frames: str | None = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    player: bool = False,
+    json: bool = False,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> int:
+    """Smooth a noisy clip, and fill joints that snap to their rest pose or spike for some frames.
+
+    The noise is estimated from the clip, joint by joint: a clean one hardly changes.
+    Bones keep their lengths. Writes take.denoised.bvh and take.denoised.json.
+
+    Try:
+      interpose denoise take.bvh
+      interpose denoise take.bvh --strength 2 --joints LeftHand,RightHand
+      interpose denoise take.bvh --frames 120:240 --player
+
+    Args:
+        file: the clip (.bvh, .npz, .amc).
+        strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
+        joints: only these joints may turn, separated by commas; a root also moves. All without it.
+        frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0. All without it.
+        output: where to write the clip; the report goes beside it.
+        player: write a page (take.denoised.html) that plays the result; it opens in any browser.
+        json: print the report as JSON.
+        force: replace existing files, of .json files only reports.
+    """
+    from interpose import tasks
+    from interpose.cli.request import range_of
+
+    chosen = split_names(joints)
+    if joints and not chosen:
+        raise RequestError(
+            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
+        )
+    part = range_of(frames) if frames is not None else None
+    clip = reading.load(file)
+    outputs = Outputs.choose(file, output, "denoised", player)
+    outputs.check(file, force)
+    with progress(f"denoising {file.name}", len(clip)):
+        done = tasks.denoise(clip, strength, chosen or None, (part.start, part.stop) if part else None)
+    more = {"denoised": done.report.to_dict()["denoised"]}
+    report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)
+    report["units"] = UNITS
+    notes = write(outputs, force, clip, done, report)
+    if json:
+        say_json(report)
+    else:
+        say("\n".join([*describe(file, clip), "", str(done.report), ""]))
+        say("\n".join([*(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, outputs.all))}"]))
+    return 0

@@ -1,0 +1,202 @@
+"""interpose stitch: clips one after another, and what leads from each to the next."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from cyclopts import Parameter
+
+from interpose.cli.console import progress, say, say_json, say_table, seconds
+from interpose.cli.outputs import Outputs, print_report, to_json, write
+from interpose.cli.reading import Reading, describe
+from interpose.errors import RequestError
+from interpose.observation import Gap
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+    from interpose.observation.timeline import Placement
+    from interpose.tasks import Stitched
+
+# Of what only this verb measures.
+UNITS = {"yaw": "degrees", "shift": "m", "jump": "cm/frame^2", "limit": "cm/frame^2"}
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A clip as it is named on the command line.
+
+    Attributes:
+        file: where it is.
+        part: START:STOP, or None for all of it.
+        whole, clip: all of the file, and what is meant of it.
+    """
+
+    file: Path
+    part: str | None
+    whole: Clip
+    clip: Clip
+
+    def __str__(self) -> str:
+        return f"{self.file}#{self.part}" if self.part else str(self.file)
+
+
+def stitch(
+    *files: Annotated[str, Parameter(name="FILES")],
+    frames: str = "auto",
+    align: Annotated[bool, Parameter(negative="--no-align")] = True,
+    loop: bool = False,
+    action: str = "",
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    method: str = "auto",
+    seed: int | None = None,
+    player: bool = False,
+    json: bool = False,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> int:
+    """Lay clips one after another, and generate what leads from each to the next.
+
+    The first clip stays where it is, and its skeleton and frame rate are those of
+    the result. Each following one is turned and placed so that it goes on where
+    the one before was heading; all of its frames are kept. Heights above the
+    floor stay as they are. Writes the clip and a report beside the first file:
+    walk.stitched.bvh and walk.stitched.json.
+
+    Try:
+      interpose stitch walk.bvh run.bvh jump.bvh --player
+      interpose stitch walk.bvh run.bvh jump.bvh --frames 20,45
+      interpose stitch walk.bvh#10:90 sit.bvh#120:300 --no-align
+      interpose stitch walk.bvh --loop
+
+    Args:
+        files: FILE or FILE#START:STOP, frames START to STOP - 1 of it (.bvh, .npz, .amc).
+        frames: how many frames to generate: one number, or one for each gap; auto chooses what is unhurried.
+        align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
+        loop: lead back to the beginning as well, so that the motion can be played round and round.
+        action: what the generated motion is; `interpose models cmib` lists what there is. Asks for the method
+            cmib.
+        output: where to write the clip; the report goes beside it.
+        method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
+        seed: for methods that sample.
+        player: write a page (walk.stitched.html) that plays the result; it opens in any browser.
+        json: print the report as JSON.
+        force: replace existing files, of .json files only reports.
+    """
+    from interpose import tasks
+    from interpose.cli.request import check_method
+
+    check_method(method)
+    if not files:
+        raise RequestError("no clips are named", "it takes two or more", "Write stitch walk.bvh run.bvh.")
+    pieces = [_read(text, reading) for text in files]
+    first = pieces[0].file
+    outputs = Outputs.choose(first, output, "stitched", player)
+    for piece in pieces:
+        outputs.check(piece.file, force)
+    clips = [piece.clip for piece in pieces]
+    with progress(f"stitching {len(clips)} clips", sum(map(len, clips))) as advance:
+        done = tasks.stitch(clips, _lengths(frames), align, loop, action, method, seed, advance)
+    report = to_json("stitch", first, outputs.clip, done.clip, done, seed, {}, _more(pieces, done))
+    report["units"] = {**report["units"], **UNITS}
+    notes = write(outputs, force, done.clip, done, report)
+    if json:
+        say_json(report)
+        return 0
+    lines = dict.fromkeys(line for piece in pieces for line in describe(piece.file, piece.whole))
+    say("\n".join([*lines, ""]))
+    _print_clips(pieces, done)
+    say()
+    print_report(done, done.clip.fps, {})
+    said = [f"note: {note}" for note in notes]
+    say("\n".join([*_closing(done), "", *said, f"wrote {', '.join(map(str, outputs.all))}"]))
+    return 0
+
+
+def _read(text: str, reading: Reading) -> Piece:
+    """FILE or FILE#START:STOP."""
+    name, _, part = text.rpartition("#")
+    if not name or ":" not in part:
+        whole = reading.load(Path(text))
+        return Piece(Path(text), None, whole, whole)
+    whole = reading.load(Path(name))
+    try:
+        span = Gap.parse(part)
+    except RequestError:
+        fix = f"Write {name}#12:80 for the frames 12 to 79."
+        raise RequestError(f"cannot read the part {part} of {name}", "a part is START:STOP", fix) from None
+    if not 0 <= span.start < span.stop <= len(whole):
+        why = f"the clip has {len(whole)} frames, counted from 0"
+        raise RequestError(f"there are no frames {part} in {name}", why, f"Choose some of 0:{len(whole)}.")
+    chosen = slice(span.start, span.stop)
+    clip = whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
+    return Piece(Path(name), part, whole, clip)
+
+
+def _lengths(text: str) -> str | list[int] | int:
+    """auto, one number, or several separated by commas."""
+    said = text.split(",")
+    if text == "auto" or not all(one.strip().isdecimal() for one in said):
+        return text  # "auto", or what `stitch` refuses
+    return int(text) if len(said) == 1 else [int(one) for one in said]
+
+
+def _placed(placement: Placement) -> dict[str, Any]:
+    shift = [round(value, 4) for value in placement.shift]
+    return {"yaw": round(float(np.degrees(placement.yaw)), 2), "shift": shift}
+
+
+def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:
+    """What only this verb says: where each clip lies on the timeline, and how a loop closes."""
+    clips = [
+        {
+            "file": str(piece.file),
+            "part": piece.part,
+            "frames": f"{laid.start}:{laid.stop}",
+            **_placed(laid.placement),
+            "scale": round(laid.scale, 4),
+            "gap_before": laid.why,
+        }
+        for piece, laid in zip(pieces, done.clips)
+    ]
+    loop = done.loop
+    if loop is None:
+        return {"clips": clips}
+    closing = {"gap_before": loop.why, "jump": loop.jump, "limit": loop.limit}
+    return {"clips": clips, "loop": {**_placed(loop.placement), **closing}}
+
+
+def _print_clips(pieces: list[Piece], done: Stitched) -> None:
+    """A line for each clip: where it lies, how it was placed, and why the gap before it has its length."""
+    say_table(
+        ("clip", "frames", "length", "turned", "moved", "scaled", "the gap before it"),
+        [
+            [
+                str(piece),
+                f"{laid.start}:{laid.stop}",
+                seconds(laid.stop - laid.start, done.clip.fps),
+                f"{np.degrees(laid.placement.yaw):.0f} deg" if laid.placement.yaw else "",
+                f"{np.hypot(*laid.placement.shift[::2]):.2f} m" if any(laid.placement.shift) else "",
+                f"{laid.scale:.3f}" if laid.scale != 1 else "",
+                laid.why,
+            ]
+            for piece, laid in zip(pieces, done.clips)
+        ],
+        right=("frames", "length", "turned", "moved", "scaled"),
+    )
+
+
+def _closing(done: Stitched) -> list[str]:
+    """How a loop closes."""
+    loop = done.loop
+    if loop is None:
+        return []
+    way, turned = np.hypot(*loop.placement.shift[::2]), np.degrees(loop.placement.yaw)
+    lines = [f"loop: {loop.why}"] if loop.why else []
+    lines += [f"loop: frame 0 follows frame {len(done.clip) - 1}, each time {way:.2f} m on"]
+    lines[-1] += f" and turned by {turned:.0f} degrees" if abs(turned) >= 0.5 else ""
+    if loop.jump is not None and loop.limit is not None:
+        lines += [f"loop: the velocity jumps there by {loop.jump:.2f} cm/frame^2 (limit {loop.limit:.2f})"]
+    return lines

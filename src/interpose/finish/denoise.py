@@ -1,0 +1,232 @@
+"""Everything is observed, but not fully trusted: how noisy a clip is, and the motion below the noise.
+
+The noise of a value is told by its fourth differences, in which captured motion all but vanishes. Each
+signal is then smoothed as far as Stein's unbiased estimate of the risk says that it gains: a clean one not at
+all. Turns are smoothed first, then the positions of the joints, which errors of single turns add up to, and
+the skeleton's own bones are solved back into those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy import ndimage
+from scipy.linalg import solveh_banded
+from scipy.stats import chi
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import feet
+from interpose.finish.report import Completion, JointNoise, NoiseReport, Provenance, Report
+from interpose.finish.solve import solve
+from interpose.finish.windows import ramp, runs
+from interpose.geometry import rotations
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Observation
+from interpose.observation.broken import broken
+from interpose.skeletons import find_mapping
+
+# The fourth difference of a signal: weights, and how much it amplifies white noise.
+DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+GAIN = float(np.linalg.norm(DIFFERENCE))
+SHORTEST = 8  # frames: less motion cannot be told from noise
+# How stiff smoothers may be: from one that takes out hardly anything to one that leaves parts of a minute.
+STIFF = 10.0 ** np.arange(-1.5, 7.01, 0.5)
+# Seconds (standard deviation) over which smoothers are compared: someone stands, and then runs.
+MOMENT = 0.5
+# Smoothers that differ by less than this in risk, in units of noise, share the result.
+TEMPERATURE = 8.0
+# A joint that trembles less than this (radians) is not touched: files have about seven digits.
+QUIET = 1e-5
+
+
+# Feet that tremble by more than this (metres) are held on the floor afterwards; clean ones stand anyway.
+SHAKY = 0.005
+
+
+# Seconds over which the result goes over into the frames before and after a range.
+BLEND = 0.2
+
+
+def denoised(
+    clip: Clip, strength: float, joints: Sequence[int] | None = None, start: int = 0, stop: int | None = None
+) -> Completion:
+    """Fill what is broken and smooth what is noisy. Bones keep their lengths.
+
+    Args:
+        clip: F frames.
+        strength: what the estimated noise is multiplied with; 0 changes nothing, not even what is broken.
+        joints: those whose rotations, and positions as far as they carry the body, may change; None for all.
+        start, stop: frames start to stop - 1 may change; the noise is estimated from them.
+
+    Raises:
+        RequestError: the range is too short.
+    """
+    stop = len(clip) if stop is None else stop
+    if stop - start < SHORTEST:
+        raise RequestError(
+            f"{stop - start} frame{'s' * (stop - start != 1)} cannot be denoised",
+            "in so short a motion noise cannot be told from what is meant",
+            f"Take {SHORTEST} frames or more.",
+        )
+    cut, part = clip.slice(start, stop), slice(start, stop)
+    free = _free(cut, joints)
+    whole = broken(cut)
+    seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
+    filled = cut if seen.complete else Spline().complete(cut, seen).clip
+    noise = deviation(filled.positions())
+    done = cut
+    if strength > 0:
+        done = _ease(filled, _smooth(filled, free, strength, noise), start > 0, stop < len(clip))
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[part], translation[part] = done.rotation, done.translation
+    result = clip.with_motion(rotation, translation)
+    provenance = np.zeros(rotation.shape[:2], np.int8)
+    changed = (done.rotation != cut.rotation).any(axis=-1)
+    changed[:, list(clip.translated)] |= (done.translation != cut.translation).any(axis=-1)
+    lost = ~(seen.rotation & seen.translation)
+    provenance[part] = np.where(lost, Provenance.METHOD, Provenance.SMOOTHED) * changed
+    report = Report("denoise", noise=_report(cut, done, lost, noise, start, strength))
+    return Completion(result, lambda: Raw(result), provenance, report)
+
+
+def _free(clip: Clip, joints: Sequence[int] | None) -> Observation:
+    """(F, J) what may be changed: rotations, and translations that carry the body: other bones stay."""
+    skeleton = clip.skeleton
+    hips = find_mapping(skeleton)["Hips"]
+    carriers = {*skeleton.roots, *(() if hips is None else (hips, *skeleton.ancestors(hips)))}
+    chosen = np.zeros(clip.rotation.shape[:2], bool)
+    chosen[:, slice(None) if joints is None else list(joints)] = True
+    moved = np.zeros_like(chosen)
+    moved[:, sorted(carriers & set(clip.translated))] = True
+    return Observation(chosen, chosen & moved)
+
+
+def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:
+    """The result, at the ends that lead on to other frames blended with the input without what was broken."""
+    count = len(done)
+    over, time = min(BLEND * done.fps, count / 2), np.arange(count)
+    share = np.ones(count)
+    if before:
+        share *= ramp((time + 1) / (over + 1))
+    if after:
+        share *= ramp((count - time) / (over + 1))
+    eased = rotations.slerp(filled.rotation, done.rotation, share[:, None])
+    same = (share == 1)[:, None] | (filled.rotation == done.rotation).all(axis=-1)
+    return done.with_motion(
+        np.where(same[..., None], done.rotation, eased),
+        filled.translation + share[:, None, None] * (done.translation - filled.translation),
+    )
+
+
+def _report(
+    clip: Clip, done: Clip, lost: np.ndarray, noise: np.ndarray, start: int, strength: float
+) -> NoiseReport:
+    moved = 100 * np.linalg.norm(done.positions() - clip.positions(), axis=-1)
+    joints = tuple(
+        JointNoise(
+            name,
+            100 * float(noise[j]),
+            float(moved[:, j].mean()),
+            float(moved[:, j].max()),
+            tuple(f"{start + a}:{start + b}" for a, b in runs(lost[:, j])),
+        )
+        for j, name in enumerate(clip.skeleton.names)
+    )
+    return NoiseReport(
+        start,
+        start + len(clip),
+        strength,
+        100 * float(noise.mean()),
+        float(moved.mean()),
+        float(moved.max()),
+        int(lost.sum()),
+        lost.size,
+        joints,
+    )
+
+
+def deviation(values: np.ndarray) -> np.ndarray:
+    """(n,) the standard deviation of white noise in each coordinate of signals (F, n, d) of a motion.
+
+    The median tells it, so that landings and other jolts do not count. Quaternions have three coordinates.
+    """
+    fourth = sum(w * values[i : len(values) - 4 + i] for i, w in enumerate(DIFFERENCE))
+    length = np.linalg.norm(fourth, axis=-1) / GAIN
+    return np.asarray(np.median(length, axis=0) / chi.median(3))
+
+
+def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -> Clip:
+    """The clip with turns and positions of what is `free` smoothed; `noise` (J,) is that of its positions."""
+    skeleton = clip.skeleton
+    moves = free.rotation.all(axis=0) & (deviation(rotations.continuous(clip.rotation)) > QUIET)
+    known = Observation(np.broadcast_to(~moves, free.rotation.shape), ~free.translation)
+    calm = _calm_turns(clip, moves, strength)
+    mapping = find_mapping(skeleton)
+    joints = mapping.mapped[1] if mapping.usable else tuple(range(len(skeleton)))
+    done = solve(calm, known, joints, _calm(clip.positions()[:, joints], clip.fps, strength))
+    shaky = strength * noise[feet.ends(skeleton)].max(initial=0.0) > SHAKY
+    return feet.plant(done, known, (0, len(done))) if shaky else done
+
+
+def _calm_turns(clip: Clip, moves: np.ndarray, strength: float) -> Clip:
+    """The clip with the turns of joints that move (J,) smoothed: to their parent or in the world, whichever
+    is quieter. Noise on positions makes the first tremble more, noise on rotations the second."""
+    own, turned = clip.rotation, clip.kinematics()[0]
+    to_parent = deviation(rotations.continuous(own)) <= deviation(rotations.continuous(turned))
+    local, world = own.copy(), turned.copy()
+    for joint, parent in enumerate(clip.skeleton.parents):
+        above = world[:, parent] if parent >= 0 else rotations.identity(len(own))
+        if moves[joint]:
+            signal = rotations.continuous((own if to_parent[joint] else turned)[:, [joint]])
+            calm = rotations.normalize(_calm(signal, clip.fps, strength)[:, 0])
+            local[:, joint] = (
+                calm if to_parent[joint] else rotations.multiply(rotations.conjugate(above), calm)
+            )
+        world[:, joint] = rotations.multiply(above, local[:, joint])
+    return clip.with_motion(local, clip.translation)
+
+
+def _calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
+    """Signals (F, n, d) smoothed as far as their noise, times `strength`, makes it worth while.
+
+    Smoothers of growing stiffness (Whittaker 1923, second differences) are weighed at every frame by their
+    risk around it: what they leave of the signal, plus twice the noise that they let through (Stein 1981).
+    """
+    return np.stack(
+        [
+            _weighed(signals[:, i], strength * noise, MOMENT * fps) if noise > 0 else signals[:, i]
+            for i, noise in enumerate(deviation(signals))
+        ],
+        axis=1,
+    )
+
+
+def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
+    """One signal (F, d), weighed as in `_calm`; its noise and `moment` (frames) are not zero."""
+    count = len(signal)
+    stages = np.stack([signal, *(_whittaker(signal, stiff) for stiff in STIFF)])
+    # The eigenvalues of the penalty are nearly those of a free beam; 1 / (1 + ...) is what is let through.
+    wave = (2.0 * np.sin(np.pi * (np.arange(2, count) - 0.5) / (2 * count))) ** 4
+    through = [1.0, *((2.0 + (1.0 / (1.0 + stiff * wave)).sum()) / count for stiff in STIFF)]
+    left = ((stages - signal) ** 2).sum(axis=-1) / noise**2
+    risk = ndimage.gaussian_filter1d(left, moment, axis=1, mode="nearest") + 6.0 * np.array(through)[:, None]
+    risk *= np.sqrt(2 * np.pi) * moment
+    share = np.exp((risk.min(axis=0) - risk) / TEMPERATURE)
+    return np.einsum("lf,lfd->fd", share / share.sum(axis=0), stages)
+
+
+def _whittaker(signal: np.ndarray, stiff: float) -> np.ndarray:
+    """The signal (F, d) nearest to this one whose squared second differences, times `stiff`, are small."""
+    count = len(signal)
+    bands = np.zeros((3, count))
+    for offset, weight in enumerate((1.0, -2.0, 1.0)):
+        bands[0, offset : count - 2 + offset] += weight**2
+    bands[1, :-1] = -2.0
+    bands[1, 1 : count - 2] -= 2.0
+    bands[2, : count - 2] = 1.0
+    bands *= stiff
+    bands[0] += 1.0
+    return np.asarray(solveh_banded(bands, signal, lower=True))

@@ -1,0 +1,74 @@
+"""A motion that goes another way over the floor: through points, and the body turns along.
+
+Kaufmann et al. 2020 name control of the trajectory as future work. As with the random paths of Kim et al.
+2022 (section 4.3.2) the poses stay, and only where the body is and where it faces is changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish.windows import ramp, runs
+from interpose.geometry import rotations
+from interpose.observation import Observation
+
+# Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.
+SLOW = 0.25
+SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
+EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
+
+
+def spans(clip: Clip, known: Observation, path: Iterable[int]) -> list[tuple[int, int]]:
+    """The runs of frames, start to stop - 1, in which a path can lead the root.
+
+    Raises RequestError for a frame of the path that lies in none.
+    """
+    unknown = ~known.rotation[:, clip.skeleton.roots[0]]
+    found = [(start, stop) for start, stop in runs(unknown) if start > 0 and stop < len(clip)]
+    for frame in path:
+        if not any(start <= frame < stop for start, stop in found):
+            raise RequestError(
+                f"the path cannot lead through frame {frame}",
+                "it lies in no gap of the whole pose with known frames on both sides",
+                "Name frames inside of a gap.",
+            )
+    return found
+
+
+def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) -> Clip:
+    """The clip with its first root led through points over frames start to stop - 1.
+
+    Both ends stay where they are, and come and go at the same velocity; in between the way is moved by a
+    cubic spline that meets the points. The root is turned by as much as the direction of the way has changed.
+
+    Args:
+        clip: F frames; start is at least 1 and stop at most F - 1.
+        points: x and z in metres for frames from start to stop - 1.
+    """
+    frames = np.arange(start - 1, stop + 1)
+    knots = [start - 1, *sorted(points), stop]
+    off = [np.zeros(2), *(points[k] - clip.root[k, [0, 2]] for k in sorted(points)), np.zeros(2)]
+    moved = CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
+    old = clip.root[frames][:, [0, 2]]
+    headings, speeds = zip(*(_way(some, clip.fps) for some in (old, old + moved)))
+    # A heading says something only while there is a way, before and after.
+    share = ramp(np.minimum(*speeds) / SLOW - 1)
+    share *= ramp(np.minimum(frames - frames[0], frames[-1] - frames) / (EASE * clip.fps))
+    turn = share * np.angle(np.exp(1j * (headings[1] - headings[0])))
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    root, inside = clip.skeleton.roots[0], slice(start, stop)
+    rotation[inside, root] = rotations.multiply(rotations.about("Y", turn[1:-1]), rotation[inside, root])
+    translation[inside, clip.translated.index(root)] += moved[1:-1, [0, 0, 1]] * [1.0, 0.0, 1.0]
+    return clip.with_motion(rotation, translation)
+
+
+def _way(points: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
+    """Direction (radians about Y, 0 along Z) and speed (metres a second) of a way (n, 2) in x and z."""
+    step = gaussian_filter1d(np.gradient(points, axis=0) * fps, SMOOTH * fps, axis=0, mode="nearest")
+    return np.arctan2(step[:, 0], step[:, 1]), np.linalg.norm(step, axis=1)

@@ -1,0 +1,118 @@
+"""Finding single values that a tracker lost: joints that snap to their rest pose, and spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from interpose.clip import Clip
+from interpose.geometry import rotations
+from interpose.observation.observation import Observation
+
+# A value is the rest pose if it differs by less (radians, metres): files keep seven digits or so.
+SAME = 1e-5
+# A value that is lost for longer (seconds) is no snap: `scan` finds it, `fill` and `recover` complete it.
+LONGEST = 1.0
+# A snap is further than this from what is around it (radians, metres), and than so many of the steps there:
+# a hinge that reaches its limit, which files write as its rest pose, arrives there with its own speed.
+JUMP, STEPS = 0.05, 2.0
+# A spike is further than this from the median of the frames around it (radians, metres), and than so many of
+# the median distances within a second on either side.
+SPIKE, TIMES = 0.35, 10.0
+AROUND = 3  # frames on either side: what lasts longer than these is no spike
+
+# A spike of a joint is real if those below it come nearer to their median without it, to this share. Noise
+# on positions turns short bones by any angle, and what hangs below them is still where it should be.
+NEARER = 0.5
+
+
+def broken(clip: Clip) -> Observation:
+    """What is left of a clip without values that were lost: an observation of it.
+
+    Joints' rotations and the translations of roots are looked at, each for itself: runs of up to LONGEST in
+    which it snaps to its rest value (or to no rotation, or to the origin), and spikes of up to three frames.
+    """
+    seen, skeleton, roots = Observation.full(clip), clip.skeleton, list(clip.skeleton.roots)
+    none = np.tile(rotations.identity(), (len(skeleton), 1))
+    lost, spikes, usual = _lost(rotations.continuous(clip.rotation), [skeleton.rest_rotation, none], clip.fps)
+    seen.rotation[lost | (spikes & _real(clip, lost, spikes, usual))] = False
+    places = clip.translation[:, [clip.translated.index(root) for root in roots]]
+    homes = [skeleton.rest_translation[roots], np.zeros((len(roots), 3))]
+    lost, spikes, _ = _lost(places, homes, clip.fps)
+    seen.translation[:, roots] = ~(lost | spikes)
+    return seen
+
+
+def _lost(
+    values: np.ndarray, homes: list[np.ndarray], fps: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which of the values (F, n, d) snap to one of the `homes` (n, d), which of the others are spikes, both
+    (F, n), and the medians (F, n, d) of what is around each."""
+    snaps, spikes, usual = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool), values.copy()
+    for column in range(values.shape[1]):
+        own = values[:, column]
+        for home in homes:
+            snaps[:, column] |= _snaps(own, home[column], max(1, round(LONGEST * fps)))
+        good = np.flatnonzero(~snaps[:, column])
+        if len(good) > 2 * AROUND:
+            spikes[good, column], middle = _spikes(own[good], round(fps))
+            usual[:, column] = middle[np.searchsorted(good, np.arange(len(own))).clip(max=len(good) - 1)]
+    return snaps, spikes, usual
+
+
+def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """How far vectors (..., 3) are apart, or the angle between quaternions (..., 4)."""
+    if a.shape[-1] == 3:
+        return np.asarray(np.linalg.norm(a - b, axis=-1))
+    chord = np.minimum(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    return 4.0 * np.arcsin(np.minimum(chord / 2, 1.0))
+
+
+def _snaps(values: np.ndarray, home: np.ndarray, longest: int) -> np.ndarray:
+    """(F,) the frames of short runs in which values (F, d) are suddenly `home` (d,)."""
+    snapped = np.zeros(len(values), bool)
+    far = _apart(values, home)
+    away = np.flatnonzero(far > SAME)
+    if not 4 <= len(away) < len(values):
+        return snapped
+    far = far[away]
+    # The steps, a frame, between values that are not at home: before and after each of them.
+    steps = _apart(values[away[1:]], values[away[:-1]]) / np.diff(away)
+    into, out = (
+        far > JUMP + STEPS * np.append(steps[:1], steps),
+        far > JUMP + STEPS * np.append(steps, steps[-1:]),
+    )
+    # Runs lie before each such value and after the last; an end of the clip is no end of a run.
+    jumps = np.append(True, into) & np.append(out, True)
+    lengths = np.diff(np.concatenate([[-1], away, [len(values)]])) - 1
+    for i in np.flatnonzero((lengths > 0) & (lengths <= longest) & jumps):
+        stop = away[i] if i < len(away) else len(values)
+        snapped[stop - lengths[i] : stop] = True
+    return snapped
+
+
+def _spikes(values: np.ndarray, second: int) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (F,) in which values (F, d) are far from the median (F, d) of those around them.
+
+    Source: Hampel's identifier; the scale is the median within a second on either side.
+    """
+    own = rotations.continuous(values) if values.shape[-1] == 4 else values
+    middle = ndimage.median_filter(own, size=(2 * AROUND + 1, 1), mode="nearest")
+    middle = rotations.normalize(middle) if values.shape[-1] == 4 else middle
+    off = _apart(own, middle)
+    return off > SPIKE + TIMES * ndimage.median_filter(off, size=2 * second + 1, mode="nearest"), middle
+
+
+def _real(clip: Clip, lost: np.ndarray, spikes: np.ndarray, usual: np.ndarray) -> np.ndarray:
+    """(F, J) where joints below one come nearer to their usual places when its spikes (F, J) are gone."""
+    if not spikes.any():
+        return spikes
+    base = clip.with_motion(np.where(lost[..., None], usual, clip.rotation), clip.translation)
+    cured = clip.with_motion(np.where(spikes[..., None], usual, base.rotation), clip.translation)
+    places = cured.positions()
+    middle = ndimage.median_filter(places, size=(2 * AROUND + 1, 1, 1), mode="nearest")
+    below = np.array(
+        [[j in clip.skeleton.ancestors(k) for j in range(len(lost[0]))] for k in range(len(lost[0]))]
+    )
+    before, after = (_apart(where, middle) @ below for where in (base.positions(), places))
+    return np.asarray(after <= NEARER * before)

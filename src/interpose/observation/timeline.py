@@ -1,0 +1,335 @@
+"""Clips one after another on one timeline, with gaps between: where each lies, and how long the gaps are.
+
+What is moved is moved as a whole: turned about the vertical and shifted over the floor. Heights stay as they
+are, since the floors of takes are level as a rule, and where they are not nobody knows which one is meant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn, wrap
+from interpose.geometry.time import resample
+from interpose.observation.observation import Gap
+from interpose.observation.part import SAME
+from interpose.skeletons import find_humanoid, find_mapping
+from interpose.skeletons.body import facing
+from interpose.skeletons.humanoid import Humanoid
+
+MOMENT = 0.5  # seconds at an end of a clip that tell where it is heading, and at which pace
+AGAIN = 2.0  # seconds of the beginning that a loop is led back to
+FORWARD = np.radians(60.0)  # who goes further aside of where they face steps sideways or backwards
+STANDS = 0.4  # metres a second: who is slower does not go anywhere
+PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
+# What is unhurried: turns of a joint (degrees a second), getting up or down (metres a second), and changes of
+# pace (metres a second, a second). A step takes STEP seconds, and a transition that is shorter slides.
+TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
+STILL = 1e-3  # metres: a joint that moves less against its parent does not move
+
+
+@dataclass(frozen=True)
+class Placement:
+    """A turn about the vertical through the origin, `yaw` radians from Z towards X, then a shift (metres)."""
+
+    yaw: float = 0.0
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def of(self, clip: Clip) -> Clip:
+        """The clip turned and shifted; bit for bit the same where there is nothing to do."""
+        if self == Placement():
+            return clip
+        rotation, translation = clip.rotation.copy(), clip.translation.copy()
+        roots = list(clip.skeleton.roots)
+        rotation[:, roots] = rotations.multiply(rotations.about("y", np.array(self.yaw)), rotation[:, roots])
+        columns = [clip.translated.index(root) for root in roots]
+        translation[:, columns] = turn(translation[:, columns], np.array(self.yaw)) + self.shift
+        return clip.with_motion(rotation, translation)
+
+
+@dataclass(frozen=True)
+class Laid:
+    """Where a clip lies on a timeline.
+
+    Attributes:
+        name: of the clip.
+        start, stop: its frames on the timeline are start to stop - 1.
+        placement: how it was turned and shifted.
+        scale: what its way was multiplied with because its body is larger or smaller than the first one's.
+        why: what decided the length of the gap before it, where nobody said it.
+    """
+
+    name: str
+    start: int
+    stop: int
+    placement: Placement = Placement()
+    scale: float = 1.0
+    why: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Timeline:
+    """Clips with gaps between them.
+
+    Attributes:
+        clip: all of it, with the layout of the first one's file; in gaps the pose before them is held.
+        gaps: what is missing.
+        laid: the clips, in order.
+        again: of a loop, where its beginning lies once more, after the last gap; it is part of `clip`.
+    """
+
+    clip: Clip
+    gaps: list[Gap]
+    laid: list[Laid] = field(repr=False)
+    again: Laid | None = None
+
+
+@dataclass(frozen=True)
+class End:
+    """How a clip begins or ends.
+
+    Attributes:
+        place: (3,) metres, of the hips.
+        velocity: (3,) metres a second over the floor.
+        course: radians, where the body is heading: 0 along Z, towards X.
+    """
+
+    place: np.ndarray
+    velocity: np.ndarray
+    course: float
+
+
+def lay(
+    clips: Sequence[Clip],
+    frames: str | int | Sequence[int] = "auto",
+    align: bool = True,
+    loop: bool = False,
+) -> Timeline:
+    """Lay clips on one timeline: on the first one's skeleton, at its frame rate.
+
+    Args:
+        clips: in order.
+        frames: the length of all gaps, or of each; "auto" chooses what is unhurried.
+        align: turn each following clip so that it heads on where the one before it was heading, and place it
+            as far ahead as the mean of both paces leads. Without it clips stay where they lie.
+        loop: one more gap leads back to the beginning, aligned like all others.
+
+    Raises:
+        RequestError: nothing to stitch, an empty clip, other skeletons, lengths that do not fit.
+    """
+    clips = list(clips)
+    if not clips or (len(clips) == 1 and not loop):
+        fix = "Name two clips or more, or let one go round: --loop."
+        raise RequestError(
+            "there is nothing to stitch", f"it takes two clips, and {len(clips)} is there", fix
+        )
+    for clip in clips:
+        if not len(clip):
+            raise RequestError(f"cannot stitch {clip.name or 'a clip'}", "it has no frames", "Leave it out.")
+    first = clips[0]
+    fitted = [(first, 1.0), *(fit(clip, first) for clip in clips[1:])]
+    if loop:
+        fitted.append((first.slice(0, round(AGAIN * first.fps) + 1), 1.0))
+    counts = _counts(frames, len(fitted) - 1)
+    # Handedness and rest pose are found from all of the motion: single short clips must not decide.
+    body = find_humanoid(_joined(first, [clip for clip, _ in fitted]))
+    done, laid, gaps = [first], [Laid(first.name, 0, len(first))], []
+    for (clip, scale), count in zip(fitted[1:], counts):
+        before, start = done[-1], laid[-1].stop
+        last, then, why = end(body, before, -1), end(body, clip, 0), ""
+        yaw = float(wrap(np.array(last.course - then.course))) if align else 0.0
+        turned = Placement(yaw).of(clip)
+        if count is None and align:
+            count, why = unhurried_length(body, before, turned)
+        elif count is None:
+            count, why = plausible_length(before, len(before) - 1, clip, 0)
+        placed = ahead(last, then, yaw, (count + 1) / first.fps) if align else Placement()
+        held = before.slice(len(before) - 1, len(before))
+        done += [held] * count + [placed.of(clip)]
+        gaps.append(Gap(start, start + count))
+        laid.append(Laid(clip.name, start + count, start + count + len(clip), placed, scale, why))
+    again = laid.pop() if loop else None
+    return Timeline(_joined(first, done), gaps, laid, again)
+
+
+def _joined(first: Clip, clips: list[Clip]) -> Clip:
+    """The motion of clips on one skeleton, one after another, with the file layout of the first one."""
+    rotation, translation = (
+        np.concatenate([getattr(clip, name) for clip in clips]) for name in ("rotation", "translation")
+    )
+    return first.with_motion(rotation, translation)
+
+
+def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
+    """The length of each gap, None where it is to be chosen."""
+    if frames == "auto":
+        return [None] * gaps
+    said = [frames] * gaps if isinstance(frames, int) else frames
+    if isinstance(said, str) or not all(isinstance(count, int) and count > 0 for count in said):
+        raise RequestError(
+            f"cannot generate {frames} frames", "it takes numbers from 1 on, or auto", "Write --frames 45."
+        )
+    if len(said) != gaps:
+        raise RequestError(
+            f"{len(said)} lengths do not fit {gaps} gaps",
+            "each clip but the first has a gap before it, and a loop one more at the end",
+            f"Give one length for all, or {gaps}.",
+        )
+    return list(said)
+
+
+def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
+    """A clip on the skeleton and at the frame rate of another one, and what its way was multiplied with.
+
+    Joints keep their local rotations, so their names and rest poses must be the same; bones may be of other
+    lengths. Then places (of the hips, above the floor at height 0 and from where they begin) go by the ratio
+    of the legs: feet that stand still stand, and on the floor.
+
+    Raises:
+        RequestError: other joints, joints that rest differently or hang from others, or a joint that is
+            moved against its parent and that `like` has no channel for.
+    """
+    order = _matched(clip, like)
+    mine = like.skeleton
+    clip = resample(clip, like.fps, smooth=True)
+    translation = np.empty((len(clip), len(like.translated), 3))
+    for column, joint in enumerate(like.translated):
+        own = order[joint]
+        moves = own in clip.translated
+        translation[:, column] = (
+            clip.translation[:, clip.translated.index(own)] if moves else mine.rest_translation[joint]
+        )
+    rest = clip.skeleton.rest_translation[order]
+    scale = 1.0
+    inner = [joint for joint in range(len(mine)) if joint not in mine.roots]
+    if not np.allclose(rest[inner], mine.rest_translation[inner], atol=STILL):
+        bodies = find_mapping(clip.skeleton), find_mapping(mine)
+        if all(body.usable for body in bodies):
+            scale = bodies[0].scale / bodies[1].scale
+            hips = bodies[1]["Hips"]
+            assert hips is not None
+            for joint in {hips, *mine.ancestors(hips)} & set(like.translated):
+                column = like.translated.index(joint)
+                pivot = translation[0, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
+                translation[:, column] = pivot + scale * (translation[:, column] - pivot)
+    fitted = replace(like, rotation=clip.rotation[:, order], translation=translation, name=clip.name)
+    return replace(fitted, source=None), scale
+
+
+def _matched(clip: Clip, like: Clip) -> list[int]:
+    """For each joint of `like` the same one of `clip`; RequestError where they are not the same."""
+    mine, other = like.skeleton, clip.skeleton
+    what = f"{clip.name or 'a clip'} is on another skeleton than {like.name or 'the first one'}"
+    fix = "Stitch clips of one character, or of others on the same rig."
+    if odd := sorted({*mine.names} ^ {*other.names}):
+        raise RequestError(what, f"joints that only one of them has: {', '.join(odd[:6])}", fix)
+    order = [other.names.index(name) for name in mine.names]
+    above, theirs = (
+        [names[parent] if parent >= 0 else "" for parent in parents]
+        for names, parents in (
+            (mine.names, mine.parents),
+            (other.names, [other.parents[joint] for joint in order]),
+        )
+    )
+    bones = rotations.between(mine.rest_translation, other.rest_translation[order])
+    bones[list(mine.roots)] = rotations.identity()
+    apart = np.maximum(
+        rotations.angle(mine.rest_rotation, other.rest_rotation[order]),
+        rotations.angle(rotations.identity(), bones),
+    )
+    worst = int(apart.argmax())
+    if above != theirs:
+        odd = [name for name, a, b in zip(mine.names, above, theirs) if a != b]
+        raise RequestError(what, f"{odd[0]} hangs from another joint there", fix)
+    if apart[worst] > SAME:
+        why = f"{mine.names[worst]} rests {np.degrees(apart[worst]):.0f} degrees away"
+        raise RequestError(what, f"{why}, so that rotations mean something else", fix)
+    for column, joint in enumerate(clip.translated):
+        here = order.index(joint)
+        if here not in like.translated and np.ptp(clip.translation[:, column], axis=0).max() > STILL:
+            why = f"{other.names[joint]} moves against its parent in only one of them"
+            raise RequestError(what, why, "Put the clip that moves it first.")
+    return order
+
+
+def end(body: Humanoid, clip: Clip, frame: int) -> End:
+    """How a clip begins (frame 0) or ends (frame -1).
+
+    A body that travels is heading where it travels, if that is about where it faces; one that stands, or
+    steps sideways or backwards, where it faces. What is no humanoid is heading where its root is turned.
+    """
+    count = round(MOMENT * clip.fps) + 1
+    part = clip.slice(0, count) if frame == 0 else clip.slice(max(0, len(clip) - count), len(clip))
+    hips = body.mapping["Hips"] if body.mapping.usable else clip.skeleton.roots[0]
+    assert hips is not None
+    places = part.positions()[:, hips]
+    way = (places[-1] - places[0]) * [1.0, 0.0, 1.0]
+    velocity = way / max(len(part) - 1, 1) * clip.fps
+    if not body.mapping.usable:
+        root = rotations.twist_about(part.rotation[frame, hips], np.array([0.0, 1.0, 0.0]))
+        return End(places[frame], velocity, float(2 * np.arctan2(root[2], root[0])))
+    course = float(facing(body.positions(part.slice(0, len(part)))[frame]) * body.hand[0])
+    travel = float(np.arctan2(velocity[0], velocity[2]))
+    if np.linalg.norm(velocity) > STANDS and abs(wrap(np.array(travel - course))) < FORWARD:
+        course = travel
+    return End(places[frame], velocity, course)
+
+
+def ahead(last: End, then: End, yaw: float, seconds: float) -> Placement:
+    """Where a clip that begins as `then`, turned by `yaw`, goes on from `last` after some seconds.
+
+    As far as a pace leads that changes evenly from the one to the other; the height stays.
+    """
+    velocity = (last.velocity + turn(then.velocity, np.array(yaw))) / 2
+    shift = last.place + seconds * velocity - turn(then.place, np.array(yaw))
+    return Placement(yaw, (float(shift[0]), 0.0, float(shift[2])))
+
+
+def unhurried_length(body: Humanoid, before: Clip, after: Clip) -> tuple[int, str]:
+    """How many frames a transition takes from the end of one clip to the beginning of another, and why.
+
+    Where the other one lies is open; it is turned already. As long as what takes longest: the joint that has
+    furthest to turn (at TURN), the hips up or down (RISE), the change of pace (CHANGE), and at least a STEP.
+    """
+    last, then = end(body, before, -1), end(body, after, 0)
+    turns = np.degrees(rotations.angle(before.rotation[-1], after.rotation[0]))
+    joint = int(turns.argmax())
+    rise = abs(float(then.place[1] - last.place[1]))
+    change = float(np.linalg.norm(then.velocity - last.velocity))
+    name = before.skeleton.names[joint]
+    needed, why = max(
+        (STEP, f"a step takes {STEP:.1f} s"),
+        (turns[joint] / TURN, f"{name} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"),
+        (rise / RISE, f"the hips go {rise:.2f} m up or down at {RISE:.1f} m/s"),
+        (change / CHANGE, f"the pace changes by {change:.1f} m/s at {CHANGE:.1f} a second"),
+    )
+    return max(1, round(float(needed) * before.fps) - 1), why
+
+
+def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[int, str]:
+    """How many frames a motion takes from frame `last` of one clip to frame `first` of another, and why.
+
+    As long as the hips need for the way at the pace of the two clips (of the second beside the pose; people
+    who stand set off at PACE), or, if that is longer, as the joint that has furthest to turn needs at TURN.
+    """
+    fps = start.fps
+    here, there = start.root[last], target.root[first]
+    way = float(np.linalg.norm((there - here)[[0, 2]]))
+    paces = []
+    for clip, frame in ((start, last), (target, first)):
+        lo, hi = max(0, frame - round(clip.fps)), min(len(clip), frame + round(clip.fps) + 1)
+        steps = np.linalg.norm(np.diff(clip.root[lo:hi, [0, 2]], axis=0), axis=1) * clip.fps
+        paces.append(float(steps.mean()) if len(steps) else 0.0)
+    pace = max(paces) if max(paces) > STANDS else PACE
+    turns = np.degrees(rotations.angle(start.rotation[last], target.rotation[first]))
+    joint = int(turns.argmax())
+    by_way, by_turn = way / pace, float(turns[joint]) / TURN
+    count = max(1, round(max(by_way, by_turn) * fps) - 1)
+    if by_way >= by_turn:
+        return count, f"{way:.2f} m at {pace:.1f} m/s"
+    return count, f"{start.skeleton.names[joint]} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"

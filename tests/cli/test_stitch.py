@@ -1,0 +1,106 @@
+"""interpose stitch: clips of several files, parts of them, loops, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from interpose.formats import load
+
+
+@pytest.fixture
+def takes(tmp_path, data):
+    """walk.bvh (209 frames), run.bvh (42) and jump.bvh (121), of three performers, in the current folder."""
+    for name in ("walk", "run", "jump"):
+        shutil.copy(data / f"cmu_{name}.bvh", tmp_path / f"{name}.bvh")
+    return tmp_path
+
+
+def test_three_takes_on_one_timeline(run, takes):
+    done = run("stitch", "walk.bvh", "run.bvh", "jump.bvh", "--frames", "20,45", "--player")
+    assert done.code == 0
+    made, walk = load(takes / "walk.stitched.bvh"), load(takes / "walk.bvh")
+    assert len(made) == 209 + 20 + 42 + 45 + 121
+    assert np.array_equal(made.rotation[:209], walk.rotation)
+    assert np.array_equal(made.translation[:209], walk.translation)
+    report = json.loads((takes / "walk.stitched.json").read_text())
+    assert report["verb"] == "stitch"
+    assert [clip["frames"] for clip in report["clips"]] == ["0:209", "229:271", "316:437"]
+    assert [clip["file"] for clip in report["clips"]] == ["walk.bvh", "run.bvh", "jump.bvh"]
+    assert [gap["frames"] for gap in report["gaps"]] == ["209:229", "271:316"]
+    for clip in report["clips"][1:]:
+        assert clip["yaw"] != 0
+        assert clip["shift"][1] == 0
+    for gap in report["gaps"]:
+        assert gap["seam_after"] <= gap["seam_limit"]
+    assert "<html" in (takes / "walk.stitched.html").read_text()
+
+
+def test_the_report_says_where_a_clip_lies(run, takes):
+    """Turned and shifted as the report says, a clip is what is in the result."""
+    report = run("stitch", "walk.bvh", "walk.bvh#100:200", "--json").json
+    placed = report["clips"][1]
+    assert placed["part"] == "100:200"
+    assert "step" in placed["gap_before"] or "at" in placed["gap_before"]
+    start, stop = map(int, placed["frames"].split(":"))
+    turn = np.radians(placed["yaw"])
+    root = load(takes / "walk.bvh").root[100:200]
+    x = np.cos(turn) * root[:, 0] + np.sin(turn) * root[:, 2] + placed["shift"][0]
+    z = np.cos(turn) * root[:, 2] - np.sin(turn) * root[:, 0] + placed["shift"][2]
+    made = load(takes / "walk.stitched.bvh").root[start:stop]
+    assert np.allclose(made, np.stack([x, root[:, 1], z], axis=1), atol=2e-3)
+
+
+def test_a_loop_of_one_clip(run, takes):
+    done = run("stitch", "walk.bvh", "--loop", "-o", "round.bvh")
+    assert done.code == 0
+    assert "frame 0 follows" in done.out
+    report = json.loads((takes / "round.json").read_text())
+    assert report["loop"]["jump"] <= report["loop"]["limit"]
+    assert len(load(takes / "round.bvh")) == int(report["gaps"][-1]["frames"].split(":")[1])
+
+
+def test_unaligned_takes_keep_their_place(run, takes):
+    report = run("stitch", "walk.bvh#10:60", "walk.bvh#80:150", "--no-align", "--json").json
+    assert [clip["yaw"] for clip in report["clips"]] == [0, 0]
+    start = int(report["clips"][1]["frames"].split(":")[0])
+    made, walk = load(takes / "walk.stitched.bvh"), load(takes / "walk.bvh")
+    assert np.array_equal(made.root[:50], walk.root[10:60])
+    assert np.allclose(made.rotation[:50], walk.rotation[10:60], rtol=0, atol=1e-12)
+    assert np.array_equal(made.root[start:], walk.root[80:150])
+
+
+def test_an_action_asks_for_cmib(run, takes):
+    report = run("stitch", "walk.bvh", "run.bvh", "--frames", "30", "--action", "run", "--json").json
+    assert report["action"] == "run"
+    assert {gap["method"] for gap in report["gaps"]} == {"cmib"}
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ([], "no clips"),
+        (["walk.bvh"], "--loop"),
+        (["walk.bvh", "none.bvh"], "none.bvh"),
+        (["walk.bvh", "run.bvh", "--frames", "5,6"], "2 lengths"),
+        (["walk.bvh", "run.bvh", "--frames", "soon"], "soon"),
+        (["walk.bvh", "run.bvh", "--frames", "0"], "0 frames"),
+        (["walk.bvh", "run.bvh#30:50"], "30:50"),
+        (["walk.bvh", "run.bvh#a:b"], "a:b"),
+        (["walk.bvh", "other.bvh"], "another skeleton"),
+        (["walk.bvh", "run.bvh", "--method", "splin"], "spline"),
+        (["walk.bvh", "run.bvh", "-o", "run.bvh", "--force"], "input"),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_three_lines(run, takes, options, says):
+    text = (takes / "run.bvh").read_text()
+    (takes / "other.bvh").write_text(text.replace("LeftFoot", "Hoof"))
+    done = run("stitch", *options)
+    assert done.code in (2, 3)
+    assert len(done.err.splitlines()) == 3
+    assert says in done.err
+    assert not list(takes.glob("*.stitched.*"))
+    assert (takes / "run.bvh").read_text() == text

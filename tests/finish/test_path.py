@@ -1,0 +1,83 @@
+"""A filled motion that is led over points of the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose.finish import measures
+from interpose.finish.path import follow
+from interpose.geometry import rotations
+
+GAP, MIDDLE = (140, 190), 165
+
+
+@pytest.fixture(scope="module")
+def aside(cmu_walk):  # type: ignore[no-untyped-def]
+    """Half a metre to the side of where the walk is in the middle of the gap."""
+    way = cmu_walk.root[GAP[1]] - cmu_walk.root[GAP[0] - 1]
+    across = np.array([way[2], -way[0]]) / np.hypot(way[0], way[2])
+    return cmu_walk.root[MIDDLE, [0, 2]] + 0.5 * across
+
+
+@pytest.mark.parametrize("method", ["spline", "cae", "cmib"])
+def test_the_path_is_met_and_everything_else_holds(cmu_walk, aside, method):
+    done = interpose.fill(cmu_walk, GAP, method=method, path={MIDDLE: aside})
+    assert np.linalg.norm(done.clip.root[MIDDLE, [0, 2]] - aside) < 0.01
+    outside = np.r_[0 : GAP[0], GAP[1] : len(cmu_walk)]
+    assert done.clip.rotation[outside].tobytes() == cmu_walk.rotation[outside].tobytes()
+    (report,) = done.report.gaps
+    assert report.path < 1
+    assert report.seam_after <= report.seam_limit
+    assert report.bone_deviation < 1e-6
+    assert report.foot_slide < 25
+    assert any("the path is met within 0." in note for note in report.notes)
+
+
+def test_the_body_turns_along_the_way_and_the_ends_stay(cmu_walk, aside):
+    led = follow(cmu_walk, *GAP, {MIDDLE: aside})
+    assert np.linalg.norm(led.root[MIDDLE, [0, 2]] - aside) < 1e-9
+    assert np.array_equal(led.root[:, 1], cmu_walk.root[:, 1])
+    assert measures.acceleration((led.root - cmu_walk.root)[[GAP[0] - 2, GAP[0] - 1, GAP[0]]]).max() < 0.003
+
+    def heading(clip):  # type: ignore[no-untyped-def]
+        step = np.gradient(clip.root, axis=0)
+        return np.arctan2(step[:, 0], step[:, 2])
+
+    turn = rotations.multiply(led.rotation[:, 0], rotations.conjugate(cmu_walk.rotation[:, 0]))
+    turned = 2 * np.arctan2(turn[:, 2], turn[:, 0])
+    wanted = np.angle(np.exp(1j * (heading(led) - heading(cmu_walk))))
+    middle = slice(GAP[0] + 12, GAP[1] - 12)
+    assert np.abs(np.angle(np.exp(1j * (turned - wanted))))[middle].max() < 0.25
+    assert np.ptp(wanted[middle]) > 0.5, "there is something to turn by"
+
+
+def test_a_path_through_where_it_goes_anyway_changes_nothing(cmu_walk):
+    plain = interpose.fill(cmu_walk, GAP, method="spline").clip
+    led = interpose.fill(cmu_walk, GAP, method="spline", path={MIDDLE: plain.root[MIDDLE, [0, 2]]}).clip
+    assert np.linalg.norm(led.positions() - plain.positions(), axis=-1).max() < 0.02
+
+
+def test_the_path_turns_with_the_clip(cmu_walk, aside):
+    turn = rotations.about("Y", np.array(0.8))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    turned = cmu_walk.with_motion(rotation, rotations.rotate(turn, cmu_walk.translation))
+    point = rotations.rotate(turn, np.array([aside[0], 0.0, aside[1]]))[[0, 2]]
+    one = interpose.fill(cmu_walk, GAP, method="spline", path={MIDDLE: aside}).clip.positions()
+    other = interpose.fill(turned, GAP, method="spline", path={MIDDLE: point}).clip.positions()
+    assert np.abs(rotations.rotate(turn, one) - other).max() < 1e-3
+
+
+@pytest.mark.parametrize("frame", [-1, 10, 74, 135, 500])
+def test_a_path_outside_of_the_gaps_is_refused(cmu_walk, frame):
+    with pytest.raises(interpose.RequestError, match=f"through frame {frame}"):
+        interpose.fill(cmu_walk, GAP, path={frame: (0.0, 0.0)})
+
+
+def test_a_way_that_the_motion_does_not_walk_is_said(cmu_walk):
+    """From frame 95 to 130 it turns on the spot."""
+    point = cmu_walk.root[112, [0, 2]] + [1.0, 0.0]
+    (report,) = interpose.fill(cmu_walk, (95, 130), method="spline", path={112: point}).report.gaps
+    assert any("times as long as" in note for note in report.notes)
