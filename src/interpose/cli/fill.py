@@ -52,21 +52,21 @@ def fill(
       interpose fill take.bvh --gap 120:160 --joints LeftArm,LeftForeArm --player
       interpose fill take.bvh --max-gap 90 --only-gap 2 --method spline
       interpose fill take.bvh --gaps take.filled.json -o again.bvh   (once more)
-      interpose fill walk.bvh --gap 120:150 --from wave.bvh --from-range 40:48 --at 130
-        --joints RightArm,RightForeArm,RightHand   (with the arm of another clip in it)
+      interpose fill take.bvh --gap 120:160 --path 140:35,-120
+      interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
+        --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
 
     Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
 
     Args:
         file: the clip (.bvh, .npz, .amc).
         gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
-        joints: the joints that are missing, separated by commas: in each --gap, or else in the whole clip.
+        joints: the joints missing in each --gap, or else in the whole clip; or those that --from gives.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
         from_: another clip of the same character that gives poses of the --joints inside of a gap.
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
-        path: FRAME:A,B, a point of the floor that the hips are led over at that frame of a gap, in the file's
-            own unit and axes (x and z where Y is up, x and y where Z is up). May be repeated.
+        path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         max_gap: leave gaps of more than this many frames open, and list them.
