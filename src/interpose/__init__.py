@@ -199,7 +199,7 @@ def denoise(
         values were smoothed or filled.
 
     Raises:
-        RequestError: too few frames, a strength below zero, a joint or range that does not exist.
+        RequestError: too few frames, a strength below 0 or above 100, a joint or range that does not exist.
         FileError: the file cannot be read.
     """
     from interpose import tasks

@@ -30,6 +30,7 @@ from interpose.skeletons import find_humanoid
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
+STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
 
 @dataclass(frozen=True)
@@ -163,13 +164,13 @@ def denoise(
         frames: the range in which anything may change, from which the noise is estimated, too.
 
     Raises:
-        RequestError: too few frames, a strength below zero, a joint or range that does not exist.
+        RequestError: too few frames, a strength below 0 or above 100, a joint or range that does not exist.
     """
-    if not (np.isfinite(strength) and strength >= 0):
+    if not 0 <= strength <= STRONGEST:
         raise RequestError(
             f"cannot denoise with strength {strength:g}",
             "the estimated noise is multiplied with it",
-            "Choose 0 or more: 1 trusts the estimate, 2 smooths more.",
+            f"Choose 0 to {STRONGEST:g}: 1 trusts the estimate, 2 smooths more.",
         )
     start, stop = frames or (0, len(clip))
     if frames is not None:

@@ -24,6 +24,7 @@ bench = App(name="bench", help="Measure how good the methods are, by published p
 def infilling(
     *,
     data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
     split: Literal["validation", "test"] = "validation",
     most: int | None = None,
     json: bool = False,
@@ -31,8 +32,46 @@ def infilling(
 ) -> None:
     """Kaufmann et al. 2020, table 1: joint error when gaps of 0 to 60 frames in 4 s are filled.
 
+    Networks to compare are trained by the same recipe and exported into folders of
+    their own; each is a row beside those of the installed weights.
+
     Try:
       interpose bench infilling --data data --split test
+      interpose train cae --out runs/vanilla --set network=vanilla --set gap=30
+      interpose export cae --run runs/vanilla --out runs/vanilla/weights
+      interpose bench infilling --weights runs/vanilla/weights
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
+        split: validation for development, test for final figures.
+        most: windows of each data set; all without it.
+        json: print JSON for other programs.
+        markdown: print only the table of all windows, in Markdown.
+    """
+    from interpose.evaluation.infilling import run
+
+    with _bar() as progress:
+        result = run(data, split, most, progress, _trained(weights, "cae") if weights else [])
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
+def denoise(
+    *,
+    data: Path = Path("data"),
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Kaufmann et al. 2020, table 2: joint error of noisy clips of 4 s, before and after denoising.
+
+    Try:
+      interpose bench denoise --data data --split test
 
     Args:
         data: the folder with the unpacked data sets; docs/data.md says where to get them.
@@ -41,7 +80,7 @@ def infilling(
         json: print JSON for other programs.
         markdown: print only the table of all windows, in Markdown.
     """
-    from interpose.evaluation.infilling import run
+    from interpose.evaluation.denoising import run
 
     with _bar() as progress:
         result = run(data, split, most, progress)
@@ -288,11 +327,11 @@ def hdm05(
     _print(result, json)
 
 
-def _trained(folders: list[Path]) -> list[Card]:
-    """The weights of CMIB in some folders, or the installed ones."""
-    from interpose.methods.weights import Card, find
+def _trained(folders: list[Path], method: str = "cmib") -> list[Card]:
+    """The weights of a method in some folders, or the installed ones."""
+    from interpose.methods.weights import find, load
 
-    return [Card.load(folder / "cmib.json") for folder in folders] or [find("cmib")]
+    return [load(folder, method) for folder in folders] or [find(method)]
 
 
 def _print(tables: list[Table], json: bool) -> None:

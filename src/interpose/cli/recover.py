@@ -67,4 +67,3 @@ def recover(
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
     return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
-

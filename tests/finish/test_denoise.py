@@ -1,0 +1,180 @@
+"""Denoising real clips: how far it gets, what it leaves alone, and what it refuses."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose import tasks
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.evaluation.denoising import UNIT, drop, shake, tremble
+from interpose.finish import Provenance, feet, measures
+from interpose.finish.denoise import deviation
+from interpose.geometry import rotations
+from interpose.skeletons import find_mapping
+
+
+def _shaken(clip: Clip, sigma: float) -> Clip:
+    joints = find_mapping(clip.skeleton).mapped[1]
+    return shake(clip, joints, UNIT * sigma, np.random.default_rng(3))
+
+
+def _apart(one: Clip, other: Clip) -> np.ndarray:
+    """(F, J) centimetres."""
+    return 100 * np.linalg.norm(one.positions() - other.positions(), axis=-1)
+
+
+@pytest.mark.parametrize(("sigma", "most"), [(0.5, 0.5), (1.0, 0.5), (1.5, 0.6)])
+def test_noise_on_positions_falls(cmu_walk, sigma, most):
+    noisy = _shaken(cmu_walk, sigma)
+    done = interpose.denoise(noisy)
+    before, after = (_apart(clip, cmu_walk).mean() for clip in (noisy, done.clip))
+    assert after < most * before
+    assert len(done.clip) == len(cmu_walk)
+    # As calm as the real one, and no pop that the noise did not have.
+    jumps = [measures.acceleration(clip.positions()) for clip in (cmu_walk, done.clip, noisy)]
+    truth, calm, rough = (np.percentile(jump, 95) for jump in jumps)
+    assert calm < 4 * truth
+    assert jumps[1].max() < rough
+
+
+def test_noise_on_rotations_falls(cmu_walk):
+    noisy = tremble(cmu_walk, 5.0, np.random.default_rng(3))
+    done = interpose.denoise(noisy)
+    assert _apart(done.clip, cmu_walk).mean() < 0.5 * _apart(noisy, cmu_walk).mean()
+
+
+@pytest.mark.parametrize("name", ["cmu_walk", "cmu_run", "cmu_jump", "cmu_02_03"])
+def test_a_clean_clip_hardly_changes(data, name):
+    clip = interpose.load(data / f"{name}.bvh")
+    moved = _apart(interpose.denoise(clip).clip, clip)
+    assert moved.mean() < 0.1
+    assert moved.mean(axis=1).max() < 0.2  # in the fastest frame, too
+    assert moved.max() < 0.5
+
+
+@pytest.mark.parametrize("probability", [0.3, 0.5])
+def test_dropped_joints_come_back(cmu_walk, probability):
+    broken = drop(cmu_walk, probability, np.random.default_rng(3))
+    done = interpose.denoise(broken)
+    assert _apart(broken, cmu_walk).mean() > 5
+    assert _apart(done.clip, cmu_walk).mean() < 1
+    assert done.report.noise.broken > 500
+    assert (done.provenance == Provenance.METHOD).sum() == done.report.noise.broken
+
+
+def test_strength_scales_from_nothing_to_smoother(cmu_walk):
+    noisy = _shaken(cmu_walk, 0.5)
+    nothing = interpose.denoise(noisy, 0)
+    assert nothing.clip.rotation.tobytes() == noisy.rotation.tobytes()
+    assert nothing.clip.translation.tobytes() == noisy.translation.tobytes()
+    assert not nothing.provenance.any()
+    rough = [
+        np.median(measures.acceleration(interpose.denoise(noisy, strength).clip.positions()))
+        for strength in (0.25, 1.0, 3.0)
+    ]
+    assert rough == sorted(rough, reverse=True)
+
+
+def test_bones_keep_their_lengths_and_still_joints_their_values(cmu_walk):
+    noisy = _shaken(cmu_walk, 1.0)
+    done = interpose.denoise(noisy).clip
+    assert done.skeleton is noisy.skeleton
+    for joint, parent in enumerate(done.skeleton.parents):
+        if parent >= 0:
+            bone = np.linalg.norm(done.positions()[:, joint] - done.positions()[:, parent], axis=-1)
+            assert np.ptp(bone) < 1e-6
+    still = (np.ptp(noisy.rotation, axis=0) == 0).all(axis=-1)
+    assert still.any()
+    assert np.array_equal(done.rotation[:, still], noisy.rotation[:, still])
+
+
+def test_feet_stand(cmu_walk):
+    noisy = _shaken(cmu_walk, 1.0)
+    joints = feet.ends(cmu_walk.skeleton)
+    truth = cmu_walk.positions()[:, joints]
+    stands = measures.speed(truth, cmu_walk.fps) < feet.STILL
+    before, after = (
+        measures.stance_speed(clip.positions()[:, joints], stands, cmu_walk.fps)
+        for clip in (noisy, interpose.denoise(noisy).clip)
+    )
+    assert after < 0.2 * before
+
+
+@pytest.mark.parametrize("sigma", [0.0, 1.0])
+def test_a_turned_and_shifted_input_gives_a_turned_and_shifted_result(cmu_walk, sigma):
+    noisy = _shaken(cmu_walk, sigma)
+    turn, shift = rotations.about("Y", np.array(2.0)), np.array([3.0, 0.0, -5.0])
+
+    def moved(clip: Clip) -> Clip:
+        rotation = clip.rotation.copy()
+        rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+        return clip.with_motion(rotation, rotations.rotate(turn, clip.translation) + shift)
+
+    assert _apart(interpose.denoise(moved(noisy)).clip, moved(interpose.denoise(noisy).clip)).max() < 2
+    assert _apart(interpose.denoise(moved(noisy)).clip, moved(interpose.denoise(noisy).clip)).mean() < 0.1
+
+
+def test_only_what_is_chosen_changes(cmu_walk):
+    noisy = _shaken(cmu_walk, 0.5)
+    arm = noisy.skeleton.index("LeftArm")
+    done = interpose.denoise(noisy, joints="LeftArm", frames="50:100")
+    changed = (done.clip.rotation != noisy.rotation).any(axis=-1)
+    assert changed[50:100, arm].all()
+    changed[50:100, arm] = False
+    assert not changed.any()
+    assert np.array_equal(done.clip.translation, noisy.translation)
+    assert (done.report.noise.start, done.report.noise.stop) == (50, 100)
+
+
+def test_a_range_leads_on_to_what_is_around_it(cmu_walk):
+    noisy = tremble(cmu_walk, 1.0, np.random.default_rng(3))
+    part = interpose.denoise(noisy, frames=(50, 150)).clip
+    whole = _apart(part, noisy)
+    assert whole[[50, 149]].mean() < 0.3 * whole[75:125].mean()
+
+
+def test_the_noise_is_estimated_well():
+    rng = np.random.default_rng(0)
+    time = np.linspace(0, 4 * np.pi, 240)[:, None, None]
+    signals = np.sin(time) + np.array([0.01, 0.1, 0.5])[:, None] * rng.standard_normal((240, 3, 3))
+    assert np.allclose(deviation(signals), [0.01, 0.1, 0.5], rtol=0.2)
+
+
+@pytest.mark.parametrize("frames", range(1, 12))
+def test_short_clips_work_or_are_refused(cmu_walk, frames):
+    clip = cmu_walk.slice(100, 100 + frames)
+    if frames < 8:
+        with pytest.raises(RequestError, match="cannot be denoised"):
+            interpose.denoise(clip)
+    else:
+        assert _apart(interpose.denoise(clip).clip, clip).mean() < 0.2
+
+
+def test_a_skeleton_that_is_no_humanoid(cmu_walk):
+    rng = np.random.default_rng(0)
+    skeleton = Skeleton(("base", "arm", "tip"), (-1, 0, 1), [[0, 0, 0], [0, 0.5, 0], [0, 0.5, 0]])
+    time = np.linspace(0, 6, 120)
+    swing = rotations.about("Z", 0.5 * np.sin(time))[:, None] * np.ones((1, 3, 1))
+    clip = Clip(skeleton, swing, np.zeros((120, 1, 3)), 30.0)
+    noisy = tremble(clip, 5.0, rng)
+    assert _apart(interpose.denoise(noisy).clip, clip).mean() < 0.6 * _apart(noisy, clip).mean()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        ({"strength": -1.0}, "strength -1"),
+        ({"strength": float("nan")}, "strength nan"),
+        ({"strength": float("inf")}, "strength inf"),
+        ({"joints": ["Tail"]}, "unknown joint: Tail"),
+        ({"frames": (10, 900)}, "outside the clip"),
+        ({"frames": (10, 12)}, "2 frames cannot be denoised"),
+    ],
+)
+def test_what_is_refused(cmu_walk, arguments, what):
+    with pytest.raises(RequestError, match=what) as error:
+        tasks.denoise(cmu_walk, **arguments)
+    assert len(str(error.value).splitlines()) == 3

@@ -1,0 +1,65 @@
+"""Single values that were lost: what is found, and what is not taken for one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose import formats
+from interpose.geometry import rotations
+from interpose.observation.broken import broken
+
+
+def test_a_snap_to_the_rest_pose_is_found(cmu_walk):
+    rotation = cmu_walk.rotation.copy()
+    arm, knee = (cmu_walk.skeleton.index(name) for name in ("LeftArm", "RightLeg"))
+    rotation[40:45, arm] = cmu_walk.skeleton.rest_rotation[arm]
+    rotation[208, knee] = [1, 0, 0, 0]
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.flatnonzero(lost[:, arm]).tolist() == [40, 41, 42, 43, 44]
+    assert np.flatnonzero(lost[:, knee]).tolist() == [208]
+    assert lost.sum() == 6
+
+
+def test_a_spike_is_found(cmu_walk):
+    rotation = cmu_walk.rotation.copy()
+    arm = cmu_walk.skeleton.index("RightForeArm")
+    rotation[100:102, arm] = rotations.multiply(
+        rotation[100:102, arm], rotations.about("X", np.array([1.0, 1.2]))
+    )
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
+
+
+def test_a_root_that_jumps_or_falls_to_the_origin_is_found(cmu_walk):
+    translation = cmu_walk.translation.copy()
+    translation[50] = 0
+    translation[90] += 3
+    lost = ~broken(cmu_walk.with_motion(cmu_walk.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[50, 0], [90, 0]]
+
+
+def test_a_long_rest_pose_is_no_snap(cmu_walk):
+    rotation = cmu_walk.rotation.copy()
+    arm = cmu_walk.skeleton.index("LeftArm")
+    rotation[40:100, arm] = cmu_walk.skeleton.rest_rotation[arm]
+    assert broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation[:, arm].all()
+
+
+def test_a_hinge_that_reaches_its_limit_is_no_snap(cmu_walk):
+    rotation = cmu_walk.rotation.copy()
+    knee = cmu_walk.skeleton.index("LeftLeg")
+    bend = np.maximum(np.sin(np.arange(len(cmu_walk)) / 5), 0)
+    rotation[:, knee] = rotations.about("X", bend)
+    assert (bend == 0).any()
+    assert broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation[:, knee].all()
+
+
+@pytest.mark.parametrize("name", ["cmu_walk", "cmu_jump", "cmu_02_03"])
+def test_nothing_is_broken_in_real_clips(data, name):
+    assert broken(formats.load(data / f"{name}.bvh")).complete
+
+
+@pytest.mark.parametrize("frames", range(6))
+def test_short_clips(cmu_walk, frames):
+    assert broken(cmu_walk.slice(50, 50 + frames)).complete
