@@ -173,6 +173,9 @@ def test_settings_of_a_recipe_are_changed_by_name(run):
     assert "Did you mean augmented" in done.err
     done = run("train", "cmib", "--out", "x", "--set", "augmented=0", "--set", "batch=many")
     assert "cannot set batch to 'many'" in done.err
+    done = run("train", "cae", "--out", "x", "--set", "network=gan")
+    assert done.code == 2
+    assert "cae, vanilla, holden" in done.err
 
 
 def test_networks_are_not_trained_on_test_performers(run, tmp_path):
@@ -190,6 +193,10 @@ def test_data_that_is_not_there(run, tmp_path):
     assert len(done.err.splitlines()) == 3
     assert run("data", "pack", "cm").code == 2
     assert run("bench", "infilling", "--data", "nowhere").code == 3
+    done = run("bench", "infilling", "--weights", "nowhere")
+    assert done.code == 3
+    assert "interpose export cae" in done.err
+    assert len(done.err.splitlines()) == 3
 
 
 def test_json_is_the_only_output(run, take):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 
 import numpy as np
@@ -13,24 +14,10 @@ from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods.cae import LENGTH, run, run_long, starts  # noqa: E402
 from interpose.models.cae import Autoencoder, Infiller, integrate, settle, to_image  # noqa: E402
 from interpose.models.keys import neighbours  # noqa: E402
-from interpose.skeletons import JOINTS, SIDES, find_humanoid  # noqa: E402
+from interpose.models.vanilla import Vanilla  # noqa: E402
+from interpose.skeletons import JOINTS, SIDES  # noqa: E402
 from interpose.training.deconvolution import quicken  # noqa: E402
 from interpose.training.export import export_onnx  # noqa: E402
-
-
-@pytest.fixture(scope="module")
-def walk(cmu_walk):  # type: ignore[no-untyped-def]
-    """(1, T, 22, 3) canonical positions of a real walk at 30 fps."""
-    body = find_humanoid(cmu_walk)
-    positions = body.positions(cmu_walk) * body.scale
-    return torch.tensor(positions[None, :128], dtype=torch.float64)
-
-
-@pytest.fixture(scope="module")
-def gap(walk):  # type: ignore[no-untyped-def]
-    observed = torch.ones(walk.shape[:-1], dtype=torch.bool)
-    observed[:, 50:80] = False
-    return observed
 
 
 @pytest.fixture(scope="module")
@@ -226,9 +213,10 @@ def test_graph_takes_several_clips_at_once(graph, walk):
     assert np.abs(together[1:] - alone).max() < 1e-5
 
 
-def test_quick_deconvolution_is_the_same_deconvolution():
+@pytest.mark.parametrize("kind", [Autoencoder, Vanilla])
+def test_quick_deconvolution_is_the_same_deconvolution(kind):
     torch.manual_seed(0)
-    network, other = Autoencoder(), Autoencoder()
+    network, other = kind(), kind()
     other.load_state_dict(network.state_dict())
     quicken(other)
     image = torch.randn(2, 1, 69, 64)
@@ -243,6 +231,19 @@ def test_quick_deconvolution_is_the_same_deconvolution():
     assert (outputs[0] - outputs[1]).abs().mean() < 0.03 * scale
     cosine = torch.nn.functional.cosine_similarity(gradients[0], gradients[1], dim=0)
     assert cosine > 0.99
+
+
+def test_a_copy_of_a_quick_network_has_weights_of_its_own():
+    """As the averaged weights have, which training measures."""
+    torch.manual_seed(0)
+    network = Autoencoder()
+    quicken(network)
+    copied, image = copy.deepcopy(network), torch.randn(1, 1, 69, 32)
+    with torch.no_grad():
+        before = copied(image)
+        for parameter in network.parameters():
+            parameter.zero_()
+        assert torch.equal(copied(image), before)
 
 
 def test_windows_lie_around_what_is_missing():

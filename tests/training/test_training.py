@@ -17,10 +17,19 @@ from interpose.datasets.pack import STEP  # noqa: E402
 from interpose.errors import FileError, RequestError  # noqa: E402
 from interpose.geometry import rotations  # noqa: E402
 from interpose.methods import weights  # noqa: E402
-from interpose.models.cae import Infiller  # noqa: E402
+from interpose.methods.cae import run  # noqa: E402
+from interpose.models.cae import Infiller, to_image  # noqa: E402
 from interpose.skeletons import find_humanoid  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
-from interpose.training.cae import CaeSettings, corrupt, curriculum_mean, train_cae  # noqa: E402
+from interpose.training.cae import (  # noqa: E402
+    NETWORKS,
+    CaeSettings,
+    bone_error,
+    corrupt,
+    curriculum_mean,
+    fit_normaliser,
+    train_cae,
+)
 from interpose.training.export import export_cae  # noqa: E402
 from interpose.training.windows import Windows  # noqa: E402
 
@@ -76,6 +85,13 @@ def test_corruption_mixes_gaps_and_joints():
     assert observed[~whole_pose][:, :, 0].all()
 
 
+def test_a_fixed_gap_is_as_long_in_every_clip():
+    observed = corrupt(np.random.default_rng(0), CaeSettings(gap=30), 0.1, 200)
+    assert ((~observed).all(axis=2).sum(axis=1) == 30).all()
+    assert ((~observed).any(axis=2).sum(axis=1) == 30).all()
+    assert len(np.unique((~observed[..., 0]).argmax(axis=1))) > 50
+
+
 def test_windows_are_real_motion_padded_with_the_last_pose(pack):
     windows = Windows([pack], ["train"], 500, torch.device("cpu"))
     positions = windows.draw(np.random.default_rng(0), 3, mirror=False)
@@ -104,6 +120,61 @@ def test_training_moves_all_weights_writes_a_log_and_goes_on(pack, tmp_path):
     moved = [float((now - start[name]).abs().max()) for name, now in model.network.state_dict().items()]
     assert min(moved) > 1e-5, "every weight has learned something"
     assert torch.isfinite(torch.cat([p.flatten() for p in model.parameters()])).all()
+
+
+@pytest.mark.parametrize("network", ["vanilla", "holden"])
+def test_networks_to_compare_with_learn_and_are_exported_by_the_same_recipe(pack, tmp_path, network):
+    settings = CaeSettings(
+        length=64, batch=2, every_seconds=0.0, network=network, gap=20, loss="l2", bones=0.5
+    )
+    model = train_cae([pack], tmp_path, Budget.parse("2steps"), settings, say=lambda line: None)
+    torch.manual_seed(settings.seed)
+    start = NETWORKS[network]().network.state_dict()
+    moved = [float((now - start[name]).abs().max()) for name, now in model.network.state_dict().items()]
+    assert min(moved) > 1e-5, "every weight has learned something"
+
+    written = export_cae(tmp_path, [pack], tmp_path / "out", ["train"])
+    card = weights.load(tmp_path / "out", "cae")
+    assert card == written
+    assert (card.name, card.training["network"], card.max_gap) == (network, network, 20)
+    assert card.training["parameters"] == sum(p.numel() for p in model.parameters())
+    for parameter in model.parameters():
+        if parameter.numel() >= 1024:
+            parameter.data = parameter.data.half().float()
+    for frames in (97, 120, 131):
+        positions = torch.from_numpy(pack.positions()[None, :frames]).float()
+        observed = torch.ones(positions.shape[:-1], dtype=torch.bool)
+        observed[:, 40:70] = False
+        with torch.no_grad():
+            theirs = [out.numpy() for out in model(positions, observed)]
+        mine = run(card.onnx, positions.numpy().astype(float), observed.numpy())
+        assert all(np.abs(a - b).max() < 1e-4 for a, b in zip(mine, theirs))
+
+
+def test_one_folder_holds_one_network(pack, tmp_path):
+    (tmp_path / "settings.json").write_text(json.dumps({"network": "vanilla"}))
+    (tmp_path / "cae.onnx").touch()
+    with pytest.raises(RequestError, match=r"cae\.onnx is in there"):
+        export_cae(tmp_path, [pack], tmp_path, ["train"])
+
+
+@pytest.mark.parametrize(("name", "choices"), [("network", "cae, vanilla, holden"), ("loss", "l1, l2")])
+def test_networks_and_losses_that_there_are_not(name, choices):
+    with pytest.raises(RequestError, match=choices):
+        CaeSettings(**{name: "gan"})
+
+
+def test_bones_of_the_right_length_cost_nothing(pack):
+    windows, rng = Windows([pack], ["train"], 60, torch.device("cpu")), np.random.default_rng(0)
+    model = Infiller()
+    fit_normaliser(model, windows, rng)
+    positions = windows.draw(rng, 2)
+    truth = model.normalised(to_image(positions, torch.ones_like(positions[..., 0], dtype=torch.bool)))[0]
+    assert float(bone_error(model, truth, truth)) == 0
+    # Twice as large, without the normaliser's mean: every bone is too long by its length.
+    larger = (2 * (truth * model.std + model.mean) - model.mean) / model.std
+    length = np.linalg.norm(pack.body[0, 1:], axis=-1).mean()
+    assert float(bone_error(model, larger, truth) * model.std[3:66].mean()) == pytest.approx(length, rel=1e-3)
 
 
 def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):

@@ -26,8 +26,12 @@ def cae(
 ) -> None:
     """Write cae.onnx, its card cae.json, and the training log with its curves.
 
+    A run of another network (--set network=vanilla) is called after it, and is for
+    interpose bench infilling --weights to compare with.
+
     Try:
       interpose export cae --run runs/cae --packs packs --out weights/cae
+      interpose export cae --run runs/vanilla --out runs/vanilla/weights
 
     Args:
         run: the folder of the training run.
@@ -35,10 +39,15 @@ def cae(
         out: the folder for the weights.
         splits: what it was trained on: train (the default), or train,validation.
     """
+    from interpose.methods.weights import FOLDERS
+
     with needs_torch("export a network"):
         from interpose.training.export import export_cae
     _export(export_cae, run, packs, out, splits)
-    say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")
+    if out.resolve().parent in FOLDERS:
+        say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")
+    else:
+        say(f"Next, to compare it with the installed weights: interpose bench infilling --weights {out}")
 
 
 @export.command

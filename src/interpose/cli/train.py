@@ -89,7 +89,9 @@ def _train(
     begin = weights.card(start) if start else None
     recipe(load_packs(packs), out, Budget.parse(budget), changed, splits=chosen, start=begin, say=say)
     say(f"done: {out}")
-    say(f"Next: interpose export {name} --run {out} --packs {packs} --out weights/{name}")
+    # A study stays apart from the weights that users get.
+    there = out / "weights" if changes else Path("weights") / name
+    say(f"Next: interpose export {name} --run {out} --packs {packs} --out {there}")
 
 
 @train.command
@@ -104,8 +106,13 @@ def cae(
 ) -> None:
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 
+    The networks and losses that the paper compares with are settings of the same recipe.
+
     Try:
       interpose train cae --packs packs --out runs/cae --budget 25m
+      interpose train cae --out runs/ours60 --set gap=30
+      interpose train cae --out runs/vanilla --set network=vanilla --set gap=30
+      interpose train cae --out runs/l2 --set loss=l2
 
     Args:
         packs: the folder with the packs to train on: `interpose data pack` makes them.

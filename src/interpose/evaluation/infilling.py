@@ -2,12 +2,13 @@
 
 Windows of 120 frames of held-out performers; gaps of 0, 15, 30 and 60 frames (0, .5, 1 and 2 s), centred;
 mean and standard deviation over joints and gap frames of the 3-D error in centimetres, without the hips.
+Networks that were trained to be compared with (the paper's baselines and ablations) are rows more.
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from interpose.evaluation.windows import Window, windows
 from interpose.finish import complete, feet, measures
 from interpose.finish.guarantees import wipe
 from interpose.methods import registry
+from interpose.methods.cae import Cae
+from interpose.methods.weights import Card
 from interpose.observation import Gap, Observation
 
 DATASETS = ("lafan1", "bandai")
@@ -39,9 +42,15 @@ ROWS = (
 
 @dataclass
 class Infilling:
-    """The figures: `errors[dataset][row][gap]` holds every window's (sum, sum of squares, count) in cm."""
+    """The figures: `errors[dataset][row][gap]` holds every window's (sum, sum of squares, count) in cm.
+
+    Attributes:
+        split: whose windows.
+        networks: those to compare with, by the name of their row.
+    """
 
     split: str
+    networks: dict[str, Cae] = field(default_factory=dict)
     counts: dict[str, int] = field(default_factory=lambda: defaultdict(int))
     errors: dict[str, dict[str, dict[int, list[np.ndarray]]]] = field(
         default_factory=lambda: defaultdict(lambda: defaultdict(lambda: defaultdict(list)))
@@ -52,6 +61,10 @@ class Infilling:
     solves: list[float] = field(default_factory=list)
     drifts: dict[int, list[float]] = field(default_factory=lambda: defaultdict(list))
     fallen: dict[int, int] = field(default_factory=lambda: defaultdict(int))
+
+    @property
+    def rows(self) -> tuple[str, ...]:
+        return (*ROWS, *self.networks)
 
     def add(self, window: Window, row: str, gap: Gap, frames: int, positions: np.ndarray) -> None:
         part = slice(gap.start, gap.stop) if frames else slice(None)
@@ -87,7 +100,7 @@ class Infilling:
                     for frames in GAPS
                     if (mean := self.mean(group, row, frames))
                 }
-                for row in ROWS
+                for row in self.rows
             }
         feet = {
             row: {str(frames): self.foot(row, frames) for frames in held} for row, held in self.feet.items()
@@ -97,6 +110,7 @@ class Infilling:
             "split": self.split,
             "windows": dict(self.counts),
             "unit": "cm",
+            "networks": {row: _origin(network.card) for row, network in self.networks.items()},
             "errors": groups,
             "feet": feet,
             "solve_error": float(np.mean(self.solves)) if self.solves else None,
@@ -112,7 +126,7 @@ class Infilling:
         """A Markdown table: mean error in cm, its deviation, and the ratio to the paper's linear row."""
         head = ["", *(f"{frames} frames" for frames in GAPS)]
         lines = []
-        for row in ROWS:
+        for row in self.rows:
             cells = [row]
             for frames in GAPS:
                 mean, ratio = self.mean(group, row, frames), self.ratio(group, row, frames)
@@ -147,6 +161,7 @@ class Infilling:
             f"Solve: {np.mean(self.solves):.2f} cm from the network's positions.",
             f"Root drift before correction: {drift}.",
             f"Fell back to the spline (by gap length): {dict(self.fallen)}.",
+            *(f"{row}: {_in_words(network.card)}." for row, network in self.networks.items()),
         ]
         return "\n\n".join([*parts, self.feet_table(), "\n".join(notes), "\n".join(checks)])
 
@@ -183,6 +198,7 @@ def run(
     split: str = "validation",
     most: int | None = None,
     progress: Callable[[float, str], None] = lambda share, line: None,
+    trained: Sequence[Card] = (),
 ) -> Infilling:
     """Measure all rows on the windows of a split.
 
@@ -190,8 +206,10 @@ def run(
         data: the folder that holds lafan1/ and bandai/.
         split: "validation", or "test" for final figures.
         most: windows per data set; None for all.
+        progress: told how it goes.
+        trained: weights to compare with, a row each.
     """
-    result = Infilling(split)
+    result = Infilling(split, named(trained))
     chosen = list(windows(data, DATASETS, split, most=most, progress=lambda line: progress(0.0, line)))
     for done, window in enumerate(chosen):
         result.counts[window.dataset] += 1
@@ -202,16 +220,45 @@ def run(
     return result
 
 
+def named(cards: Sequence[Card]) -> dict[str, Cae]:
+    """A row for each of some weights, named by the network and how it was trained."""
+    rows: dict[str, Cae] = {}
+    for card in cards:
+        how = card.training
+        gap = f"gaps of {how['gap'] / card.fps:g} s" if how.get("gap") else "curriculum"
+        loss = [how["loss"].upper()] if how.get("loss", "l1") != "l1" else []
+        bones = [f"bones {how['bones']:g}"] if how.get("bones") else []
+        row = f"{card.name} ({', '.join([gap, *loss, *bones])}), true trajectory"
+        # Two that were trained alike, by another budget or seed: the folder tells them apart.
+        rows[f"{row}, {card.path.parent}" if row in rows else row] = Cae(card)
+    return rows
+
+
+def _origin(card: Card) -> dict[str, Any]:
+    """Where weights come from."""
+    figures = {name: card.training[name] for name in ("parameters", "device_hours")}
+    return {**figures, "folder": str(card.path.parent)}
+
+
+def _in_words(card: Card) -> str:
+    how = _origin(card)
+    return f"{how['parameters']:,} parameters, {how['device_hours']:.2f} h of training, {how['folder']}"
+
+
 def _measure(result: Infilling, window: Window, frames: int) -> None:
     gap = window.centred(frames)
     hidden = window.hide(gap)
     network = registry.get("cae")
+    wiped = wipe(window.clip, hidden)
+    for row, compared in result.networks.items():
+        own = compared.complete(wiped, hidden).own
+        assert own is not None
+        result.add(window, row, gap, frames, window.placed(_spoken(window, own)))
     if frames == 0:
         raw = network.complete(window.clip, hidden)
         assert raw.own is not None
         result.add(window, "cae, true trajectory", gap, 0, window.placed(_spoken(window, raw.own)))
         return
-    wiped = wipe(window.clip, hidden)
     for name in ("zero-velocity", "linear"):
         answer = registry.get(name).complete(wiped, hidden).clip
         row = name if name == "zero-velocity" else f"{name}, true trajectory"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -106,14 +107,20 @@ def handover(seen: np.ndarray) -> np.ndarray:
     return x * x * (3 - 2 * x)
 
 
+@dataclass(frozen=True)
 class Cae:
-    """Fills gaps of whole poses and recovers joints; thinks at 30 fps on 22 joints scaled to one leg."""
+    """Fills gaps of whole poses and recovers joints; thinks at 30 fps on 22 joints scaled to one leg.
 
+    Attributes:
+        trained: the weights; the installed ones without any.
+    """
+
+    trained: weights.Card | None = None
     name = "cae"
 
     @property
     def card(self) -> weights.Card:
-        return weights.find(self.name)
+        return self.trained or weights.find(self.name)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: a skeleton that is no humanoid, or a gap beyond what the network was trained for."""

@@ -104,6 +104,19 @@ def find(method: str) -> Card:
     )
 
 
+def load(folder: Path, method: str) -> Card:
+    """The card of weights that `interpose export` wrote into a folder. Raises FileError without any."""
+    for path in sorted(folder.glob("*.onnx")):
+        found = Card.load(path.with_suffix(".json"))
+        if found.method == method:
+            return found
+    raise FileError(
+        f"no weights of {method} in {folder}",
+        "it has no .onnx file with a card of that method",
+        f"Write them: interpose export {method} --run RUN --out {folder}",
+    )
+
+
 def card(name: str) -> Card:
     """The card of some weights by name; the error lists all names."""
     for known in cards():

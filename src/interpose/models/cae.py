@@ -1,7 +1,8 @@
 """The convolutional autoencoder of Kaufmann et al. 2020, from joint positions to joint positions.
 
 `Autoencoder` is the paper's network. `Infiller` puts around it all that belongs to the method: the 69-row
-image of a motion, the normaliser, and the way back to a global trajectory; it is what ONNX holds.
+image of a motion, the normaliser, and the way back to a global trajectory; it is what ONNX holds. The
+networks that the paper compares with, `vanilla` and `holden`, take the place of the network, nothing else.
 """
 
 from __future__ import annotations
@@ -187,16 +188,32 @@ class Infiller(nn.Module):
     mean: Tensor
     std: Tensor
 
-    def __init__(self, network: nn.Module | None = None) -> None:
+    def __init__(self, network: nn.Module | None = None, rows: int = ROWS) -> None:
         super().__init__()
         self.network = network if network is not None else Autoencoder()
-        self.register_buffer("mean", torch.zeros(ROWS, 1))
-        self.register_buffer("std", torch.ones(ROWS, 1))
+        self.register_buffer("mean", torch.zeros(rows, 1))
+        self.register_buffer("std", torch.ones(rows, 1))
+
+    def shown(self, image: Image) -> tuple[Tensor, Tensor]:
+        """The rows (B, R, T) that the network learns, and which of their values are known.
+
+        The image's 69 rows come first; a network may be shown more.
+        """
+        return image.rows, image.known
+
+    def normalised(self, image: Image) -> tuple[Tensor, Tensor]:
+        """The same, rows with a mean of 0 and a deviation of 1 over the training data."""
+        rows, known = self.shown(image)
+        return (rows - self.mean) / self.std, known
 
     def predict(self, image: Image) -> Tensor:
-        """Normalised rows (B, 69, T), the network's answer to what is known; masked values are 0."""
-        masked = torch.where(image.known, (image.rows - self.mean) / self.std, 0.0)
-        return self.network(masked[:, None])[:, 0]
+        """Normalised rows (B, R, T), the network's answer to what is known; masked values are 0."""
+        rows, known = self.normalised(image)
+        return self.network(torch.where(known, rows, 0.0)[:, None])[:, 0]
+
+    def answer(self, image: Image) -> Tensor:
+        """The same in metres and radians, and no more than the image's rows (B, 69, T)."""
+        return (self.predict(image) * self.std + self.mean)[:, :ROWS]
 
     def forward(self, positions: Tensor, observed: Tensor) -> tuple[Tensor, Tensor, Tensor]:
         """Complete a motion.
@@ -213,7 +230,7 @@ class Infiller(nn.Module):
         """
         positions = torch.where(observed[..., None], positions, 0.0)
         image = to_image(positions, observed)
-        rows = self.predict(image) * self.std + self.mean
+        rows = self.answer(image)
         up = positions.new_tensor([0.0, 1.0, 0.0])
         body = self._body(rows) + image.floor[:, None, None, None] * up
         return body, self._place(rows, image, False), self._place(settle(rows, image), image, True)

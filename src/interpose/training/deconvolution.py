@@ -8,6 +8,7 @@ gradient has a fast path, so it is asked for directly. Parameters and results st
 
 from __future__ import annotations
 
+from types import MethodType
 from typing import Any
 
 import torch
@@ -15,9 +16,11 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 
-def _gradients(output: Tensor, into: Tensor, weight: Tensor, stride: int, mask: list[bool]) -> Any:
+def _gradients(
+    output: Tensor, into: Tensor, weight: Tensor, stride: tuple[int, ...], mask: list[bool]
+) -> Any:
     return torch.ops.aten.convolution_backward(
-        output, into, weight, None, [stride] * 2, [1, 1], [1, 1], False, [0, 0], 1, mask
+        output, into, weight, None, stride, [1, 1], [1, 1], False, [0, 0], 1, mask
     )
 
 
@@ -26,7 +29,7 @@ class _Deconvolution(torch.autograd.Function):
 
     @staticmethod
     @torch.amp.custom_fwd(device_type="cpu", cast_inputs=torch.bfloat16)
-    def forward(ctx: Any, x: Tensor, weight: Tensor, stride: int, size: list[int]) -> Tensor:
+    def forward(ctx: Any, x: Tensor, weight: Tensor, stride: tuple[int, ...], size: list[int]) -> Tensor:
         ctx.save_for_backward(x, weight)
         ctx.stride = stride
         like = torch.empty((len(x), weight.shape[1], *size), dtype=x.dtype)
@@ -42,14 +45,16 @@ class _Deconvolution(torch.autograd.Function):
         return into, _gradients(x, gradient, weight, ctx.stride, [False, True, False])[1], None, None
 
 
+def _forward(module: nn.ConvTranspose2d, x: Tensor) -> Tensor:
+    assert module.bias is not None
+    size = [n * step for n, step in zip(x.shape[-2:], module.stride)]
+    y = _Deconvolution.apply(x, module.weight, module.stride, size)
+    return y + module.bias.to(y.dtype)[:, None, None]
+
+
 def quicken(model: nn.Module) -> None:
     """Send the strided deconvolutions of a model through the fast path; for training on a CPU in bfloat16."""
     for module in model.modules():
-        if isinstance(module, nn.ConvTranspose2d) and module.stride == (2, 2):
-
-            def forward(x: Tensor, module: nn.ConvTranspose2d = module) -> Tensor:
-                assert module.bias is not None
-                y = _Deconvolution.apply(x, module.weight, 2, [2 * n for n in x.shape[-2:]])
-                return y + module.bias.to(y.dtype)[:, None, None]
-
-            module.forward = forward
+        if isinstance(module, nn.ConvTranspose2d) and module.stride != (1, 1):
+            # A method, and no function that knows the module: in a copy of the model it is the copy's.
+            module.forward = MethodType(_forward, module)

@@ -15,11 +15,13 @@ from onnx import TensorProto, helper, numpy_helper
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.datasets import DATASETS, Pack
+from interpose.errors import RequestError
 from interpose.methods.weights import Card
 from interpose.models.cae import Infiller
 from interpose.models.cmib import Cmib, CmibConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
+from interpose.training.cae import NETWORKS
 
 LICENCES = {
     "lafan1": "CC BY-NC-ND 4.0",
@@ -29,6 +31,12 @@ LICENCES = {
 }
 RESEARCH = "research and non-commercial use: the training data is licensed so"
 OPEN = "any use: trained on CMU data alone"
+# What the recipe of the autoencoder trains, for the card; the others are there to be compared with.
+DESCRIPTIONS = {
+    "cae": "Convolutional autoencoder for infilling (Kaufmann et al. 2020)",
+    "vanilla": "Plain convolutional autoencoder, a baseline of Kaufmann et al. 2020",
+    "holden": "Motion manifold of Holden et al. 2016, a baseline of Kaufmann et al. 2020",
+}
 
 
 def export_onnx(model: Infiller, path: Path) -> None:
@@ -117,25 +125,31 @@ def _halve(model: onnx.ModelProto) -> None:
 
 
 def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
-    """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder."""
-    model = Infiller()
+    """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder.
+
+    A run of one of the networks to compare with is called after that network instead.
+    """
+    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    name = settings.get("network", "cae")
+    _check_free(out, name)
+    model = NETWORKS[name]()
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)
-    export_onnx(model, out / "cae.onnx")
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    export_onnx(model, out / f"{name}.onnx")
     log, earlier, auto = _history(folder)
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
-    _curves(log, "cae", "L1, normalised", (15, 30, 60), out)
+    _curves(log, name, f"{settings.get('loss', 'l1').upper()}, normalised", (15, 30, 60), out)
+    longest = settings.get("gap") or 60
     card = Card(
-        name="cae",
+        name=name,
         method="cae",
-        description="Convolutional autoencoder for infilling (Kaufmann et al. 2020), gaps to 2 s",
+        description=f"{DESCRIPTIONS[name]}, gaps to {longest / 30:g} s",
         licence=_licence(packs),
         data=_data(packs, splits),
         tasks=["fill", "recover"],
         joints=list(JOINTS),
         fps=30.0,
-        max_gap=60,
+        max_gap=longest,
         training={
             **_training("cae", settings, splits, log, earlier, model),
             "statistics": {
@@ -146,8 +160,16 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         metrics={"validation": log[-1]},
         auto=auto,
     )
-    card.save(out / "cae.json")
+    card.save(out / f"{name}.json")
     return card
+
+
+def _check_free(out: Path, name: str) -> None:
+    """One folder holds one network: its log and its curves have no name. RequestError otherwise."""
+    if others := [path for path in out.glob("*.onnx") if path.stem != name]:
+        raise RequestError(
+            f"cannot write {name}.onnx into {out}", f"{others[0].name} is in there", "Write --out FOLDER."
+        )
 
 
 def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
