@@ -343,3 +343,16 @@ def test_other_values_of_the_clips_do_not_reach_each_other(cmu_walk):
     one, other = (tasks.stitch([first, clip]) for clip in (second, moved))
     assert len(one.clip) == len(other.clip)
     assert np.abs(one.clip.positions() - other.clip.positions()).max() < 1e-3
+
+
+def test_auto_takes_the_network_made_for_keys_where_keys_are_lone(cmu_walk):
+    def methods(*gaps):  # type: ignore[no-untyped-def]
+        seen = Observation.from_gaps(cmu_walk, [Gap(*gap) for gap in gaps])
+        return [job.method.name for job in tasks.plan(cmu_walk, seen, "auto", None, None, {})]
+
+    assert methods((10, 40), (41, 80)) == ["cmib", "cmib"], "a key in the middle"
+    assert methods((10, 40), (42, 80)) == ["cae", "cae"]
+    assert methods((1, 6), (7, 12)) == ["cmib", "spline"], "a key at the start, and motion after the last gap"
+    assert methods((1, 150)) == ["spline"], "longer than it can fill"
+    assert methods((0, 30)) != ["cmib"], "nothing before it"
+    assert {gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps} == {"cmib"}

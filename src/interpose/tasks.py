@@ -337,7 +337,7 @@ def plan(
         if name == "auto" and action:
             name = "cmib"
         if name == "auto":
-            chosen, note = auto.choose(clip, lead)
+            chosen, note = auto.choose(clip, lead, _lone(observation, gap))
         else:
             chosen = registry.told(name, action)
         jobs.append(Job(number, gap, None if open_ else chosen, note))
@@ -351,6 +351,16 @@ def _span(observation: Observation, clip: Clip, start: int, stop: int) -> Gap:
         return Gap(start, stop)
     lost = ~(part & observation.translation[start:stop])
     return Gap(start, stop, tuple(clip.skeleton.names[j] for j in np.flatnonzero(lost.any(axis=0))))
+
+
+def _lone(observation: Observation, gap: Gap) -> int:
+    """How many sides of the gap are single known frames; 0 at an end of the clip."""
+    known = observation.frames
+    if gap.start == 0 or gap.stop == len(known):
+        return 0
+    return int(known[max(0, gap.start - 2) : gap.start].sum() == 1) + int(
+        known[gap.stop : gap.stop + 2].sum() == 1
+    )
 
 
 def _lead(observation: Observation, gap: Gap) -> Gap:
