@@ -7,7 +7,7 @@ from typing import Any
 from interpose.cli.console import say, say_json, say_table
 
 METHODS = {
-    "auto": "what measured best for the length of a gap: short ones the spline, long ones a network",
+    "auto": "what measured best: short gaps the spline, long ones cae, between lone keys cmib",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
@@ -81,7 +81,7 @@ def _lines(value: Any, indent: str = "") -> list[str]:
         elif isinstance(item, list) and len(item) > 24:
             lines.append(f"{indent}{title}: {len(item)} numbers, see --json")
         elif isinstance(item, list):
-            lines.append(f"{indent}{title}: {', '.join(map(str, item))}")
+            lines.append(f"{indent}{title}: {', '.join(str(one) for one in item if one != '')}")
         elif item not in ({}, "", None):
             lines.append(
                 f"{indent}{title}: {item:.4g}" if isinstance(item, float) else f"{indent}{title}: {item}"

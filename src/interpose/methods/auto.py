@@ -10,8 +10,8 @@ from interpose.observation import Gap
 
 # Frames at 30 fps from which `cmib` is better than the others, by how many sides of the gap are lone keys. On
 # the validation performer its L2P between two is .85, .71 and .68 of interpolation's at 7, 40 and 60 frames,
-# the spline's 1.10, 1.01 and 1.02, that of `cae` 1.01, 1.01 and .99 (bench lafan1 --protocol cmib). With motion
-# before the gap and a lone key after it .64, .69 and .72 at 5, 15 and 30; the spline's .61, .77 and .83.
+# the spline's 1.10, 1.01 and 1.02, and that of `cae` 1.01, 1.01 and .99 (bench lafan1 --protocol cmib). With
+# motion before the gap and a lone key after it .64, .69 and .72 at 5, 15 and 30; the spline's .61, .77, .83.
 LONE = {1: 10, 2: 1}
 
 
