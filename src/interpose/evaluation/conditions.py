@@ -130,6 +130,7 @@ def anchors(
         f"Metres between an anchor, moved by {MOVED:g} m, and what the network itself says there, before its "
         f"motion is moved onto it; {len(clips)} windows of {' and '.join(WALKS)}, {split} performer:",
         [f"t = {frame}" for frame in ANCHORS],
+        digits=4,
     )
     for done, card in enumerate(trained):
         augmented = card.training.get("augmented", 0.0)

@@ -116,8 +116,9 @@ def complete(
         return _along(path, clip, observation, known, method, seed, fallback, limit, first)
     hanging = loose(hidden, known)
     if hanging.any() and not isinstance(method, Layer):
-        body = complete(clip, without(observation, hanging), method, seed, fallback, limit)
-        method = Layer(method.name, body.clip, body.raw, hanging)
+        body = complete(clip, without(observation, hanging), method, seed, fallback, limit, first=first)
+        layer = Layer(method.name, body.clip, body.raw, hanging)
+        return _told_of(body, complete(clip, observation, layer, seed, fallback, limit, first=first))
     gaps = known.gaps(clip.skeleton)
     if not gaps:
         return Completion(
@@ -222,15 +223,14 @@ def _along(
 ) -> Completion:
     """Complete a clip, lead the root along the path, and make the result usable once more."""
     gaps = spans(clip, known, path)
-    done = complete(clip, observation, method, seed, fallback, limit)
-    led = body = done.clip
+    body = complete(clip, observation, method, seed, fallback, limit, first=first)
+    led = body.clip
     for start, stop in gaps:
         if points := {frame: point for frame, point in path.items() if start <= frame < stop}:
             led = follow(led, start, stop, points)
     nothing = np.zeros_like(known.rotation)
-    names = {gap.method for gap in done.report.gaps}
-    layer = Layer(names.pop() if len(names) == 1 else method.name, led, done.raw, nothing, stands=False)
-    done = complete(clip, observation, layer, seed, layer, limit, first=first)
+    layer = Layer(method.name, led, body.raw, nothing, stands=False)
+    done = _told_of(body, complete(clip, observation, layer, seed, layer, limit, first=first))
 
     def judged(gap: GapReport) -> GapReport:
         off = [done.clip.root[f, [0, 2]] - p for f, p in path.items() if gap.start <= f < gap.stop]
@@ -240,7 +240,7 @@ def _along(
         notes = [f"the path is met within {missed:.1f} cm"]
         own, new = (
             np.linalg.norm(np.diff(c.root[gap.start - 1 : gap.stop + 1, [0, 2]], axis=0), axis=1).sum()
-            for c in (body, done.clip)
+            for c in (body.clip, done.clip)
         )
         if new > FURTHER * own:
             notes.append(
@@ -251,6 +251,30 @@ def _along(
 
     reports = [judged(gap) for gap in done.report.gaps]
     return replace(done, report=replace(done.report, gaps=reports))
+
+
+def _told_of(body: Completion, done: Completion) -> Completion:
+    """What was laid on a body, or led, with what its report says of gaps that a simpler method filled."""
+    before = {
+        frame: gap
+        for gap in body.report.gaps
+        if gap.method != done.report.method
+        for frame in range(gap.start, gap.stop)
+    }
+    reports = [
+        replace(
+            gap,
+            method=one.method,
+            model=None,
+            notes=(*(n for n in one.notes if n not in gap.notes), *gap.notes),
+        )
+        if (one := before.get(gap.start)) and gap.method == done.report.method
+        else gap
+        for gap in done.report.gaps
+    ]
+    fell = (body.provenance == Provenance.FALLBACK) & (done.provenance != Provenance.OBSERVED)
+    provenance = np.where(fell, Provenance.FALLBACK, done.provenance).astype(done.provenance.dtype)
+    return replace(done, provenance=provenance, report=replace(done.report, gaps=reports))
 
 
 def check_pins(observation: Observation) -> None:
