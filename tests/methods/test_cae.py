@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from interpose.methods.cae import HANDOVER, LENGTH, handover, starts
+from interpose.methods.cae import HANDOVER, LENGTH, starts
+from interpose.methods.positional import handover
 
 
 def test_the_spline_hands_over_to_the_network():
     seen = np.ones((120, 22), bool)
     seen[40:80] = False
     seen[:, 5] = False
-    share = handover(seen)
+    share = handover(seen, HANDOVER)
     assert (share[seen] == 0).all()
     assert (share[:, 5] == 1).all(), "a joint that is never seen is the network's"
     assert share[40 + HANDOVER, 0] == 1
