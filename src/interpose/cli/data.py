@@ -79,7 +79,7 @@ def pack(*names: str, data: Path = Path("data"), out: Path = Path("packs"), forc
       interpose data pack lafan1 bandai --data data --out packs
 
     Args:
-        names: the data sets; all without any.
+        names: the data sets; all that are there without any.
         data: the folder with the unpacked data sets.
         out: the folder for the packs.
         force: replace existing packs.
@@ -90,7 +90,7 @@ def pack(*names: str, data: Path = Path("data"), out: Path = Path("packs"), forc
     for name in names:
         if name not in DATASETS:
             raise unknown("data set", name, DATASETS)
-    chosen = names or tuple(DATASETS)
+    chosen = names or tuple(name for name in DATASETS if (data / name).is_dir()) or tuple(DATASETS)
     for name in chosen:
         if (out / f"{name}.npz").exists() and not force:
             what = f"cannot write {out / name}.npz"

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from interpose.clip import Clip
+from interpose.datasets import h36m
 from interpose.errors import FileError, unknown
 from interpose.formats import load
 
@@ -25,13 +26,18 @@ _AMC_FRAME = re.compile(rb"^\d+\s*$", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Entry:
-    """One published clip."""
+    """One published clip; `part` is its name where that of the file alone does not say which it is."""
 
     dataset: str
     path: Path
     performer: str
     label: str
     trains_only: bool = False
+    part: str = ""
+
+    @property
+    def name(self) -> str:
+        return self.part or self.path.stem
 
     @property
     def split(self) -> str:
@@ -39,12 +45,16 @@ class Entry:
 
     def load(self) -> Clip:
         """The clip, without the rest pose that CMU's BVH files begin with."""
+        if self.dataset == "h36m":
+            return h36m.load(self.path, self.part)
         clip = load(self.path)
         rest_pose = self.dataset == "cmu" and self.path.suffix == ".bvh"
         return clip.slice(1, len(clip)) if rest_pose else clip
 
     def seconds(self) -> float:
         """How long the clip is, without reading its motion."""
+        if self.dataset == "h36m":
+            return h36m.seconds(self.path, self.part)
         if self.path.suffix == ".amc":
             return len(_AMC_FRAME.findall(self.path.read_bytes())) / 120.0
         head = _BVH_LENGTH.search(self.path.read_bytes())
@@ -109,12 +119,19 @@ def _hdm05(folder: Path) -> list[Entry]:
     return found
 
 
+def _h36m(folder: Path) -> list[Entry]:
+    return [
+        Entry("h36m", path, subject, action, part=name) for path, subject, action, name in h36m.find(folder)
+    ]
+
+
 DATASETS: dict[str, Callable[[Path], list[Entry]]] = {
     "lafan1": _lafan1,
     "bandai": _bandai,
     "pfnn": _pfnn,
     "cmu": _cmu,
     "hdm05": _hdm05,
+    "h36m": _h36m,
 }
 
 

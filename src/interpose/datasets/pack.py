@@ -15,6 +15,7 @@ from interpose.clip import Clip
 from interpose.datasets.catalogue import FPS, Entry, clips
 from interpose.errors import FileError
 from interpose.geometry import rotations
+from interpose.geometry.time import resample
 from interpose.skeletons import JOINTS, canonical_positions, find_humanoid
 from interpose.skeletons.humanoid import THIGHS
 from interpose.skeletons.rest import Rest
@@ -94,12 +95,12 @@ def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambd
     for entry in clips(dataset, data):
         if entry.split == "test":
             continue
-        clip = _at_fps(entry.load())
+        clip = resample(entry.load(), FPS)
         body = find_humanoid(clip)
         if not body.mapping.usable:
-            progress(f"left out: {entry.path.name} (no humanoid: {', '.join(body.mapping.lacking)})")
+            progress(f"left out: {entry.name} (no humanoid: {', '.join(body.mapping.lacking)})")
         elif len(clip) < 2 or np.abs(np.diff(body.root(clip) * body.scale, axis=0)).max() > JUMP:
-            progress(f"left out: {entry.path.name} (too short, or the body jumps)")
+            progress(f"left out: {entry.name} (too short, or the body jumps)")
         else:
             chosen.append((entry, clip))
     rests = dict(_rests(chosen))
@@ -120,22 +121,10 @@ def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambd
         np.array(bones, np.float32).reshape(shape),
         np.array(bodies, np.float32).reshape(shape),
         np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-        np.array([entry.path.stem for entry, _ in chosen]),
+        np.array([entry.name for entry, _ in chosen]),
         np.array([entry.performer for entry, _ in chosen]),
         np.array([entry.label for entry, _ in chosen]),
         np.array([entry.split for entry, _ in chosen]),
-    )
-
-
-def _at_fps(clip: Clip) -> Clip:
-    """Every n-th frame, so that the rate is that of packs."""
-    step = max(1, round(clip.fps / FPS))
-    return replace(
-        clip,
-        rotation=clip.rotation[::step],
-        translation=clip.translation[::step],
-        fps=clip.fps / step,
-        source=None,
     )
 
 
