@@ -19,8 +19,9 @@ from interpose.finish.denoise import denoised
 from interpose.finish.guarantees import check_pins
 from interpose.finish.measures import acceleration
 from interpose.finish.path import spans as path_spans
-from interpose.finish.windows import ramp, runs
+from interpose.finish.windows import ramp
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Part, timeline

@@ -7,7 +7,7 @@ import pytest
 
 from interpose.clip import Clip
 from interpose.finish import complete, feet, measures
-from interpose.finish.windows import runs
+from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 
 STARTS = range(12, 90, 13)

@@ -20,8 +20,9 @@ from interpose.errors import RequestError
 from interpose.finish import feet
 from interpose.finish.report import Completion, JointNoise, NoiseReport, Provenance, Report
 from interpose.finish.solve import solve
-from interpose.finish.windows import ramp, runs
+from interpose.finish.windows import ramp
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation

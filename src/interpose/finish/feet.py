@@ -13,8 +13,9 @@ from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish import measures
-from interpose.finish.windows import ramp, runs
+from interpose.finish.windows import ramp
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.observation import Observation
 from interpose.skeletons import LEG_LENGTH, find_mapping
 

@@ -14,8 +14,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish.windows import ramp, runs
+from interpose.finish.windows import ramp
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.observation import Observation
 
 # Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.

@@ -15,8 +15,8 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.finish import measures
 from interpose.finish.solve import refine
-from interpose.finish.windows import runs
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.observation import Observation
 
 # Seconds over which a difference in value, and one in velocity, fade into a gap. A slope fades sooner: over a

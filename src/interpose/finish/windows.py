@@ -5,12 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 
-def runs(flags: np.ndarray) -> list[tuple[int, int]]:
-    """The ranges (start, stop) of frames in which `flags` (F,) is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
-
-
 def grow(flags: np.ndarray, by: int) -> np.ndarray:
     """`flags` (F, ...) also True up to `by` frames before and after."""
     grown = flags.copy()

@@ -21,6 +21,12 @@ Array = Any
 BLOCK = 4096
 
 
+def runs(flags: np.ndarray) -> list[tuple[int, int]]:
+    """The ranges (start, stop) of frames in which `flags` (F,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return [(int(start), int(stop)) for start, stop in edges.reshape(-1, 2)]
+
+
 def _around(xp: Any, frames: int, times: Array) -> tuple[Array, Array, Array]:
     """The samples before and after each time (n,), and how far it lies between them, 0 to 1."""
     times = xp.clip(times, 0, frames - 1)

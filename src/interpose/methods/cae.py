@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.geometry.time import runs
 from interpose.methods import positional, weights
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
@@ -49,9 +50,8 @@ def starts(complete: np.ndarray) -> np.ndarray:
     One around the middle of every incomplete run; several, evenly spread, for a long one.
     """
     last = max(len(complete) - LENGTH, 0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], complete, [True]]).astype(int)))
     chosen: set[int] = set()
-    for start, stop in edges.reshape(-1, 2):
+    for start, stop in runs(~complete):
         count = 1 if stop - start <= LONGEST else 1 + -(-(stop - start - LONGEST) // STEP)
         middles = np.linspace(start, stop, 2 * count + 1)[1::2]
         chosen |= {int(np.clip(round(middle - LENGTH / 2), 0, last)) for middle in middles}
