@@ -12,14 +12,10 @@ onnx = pytest.importorskip("onnx")
 
 from onnx import numpy_helper  # noqa: E402
 
-from interpose.datasets import Pack  # noqa: E402
-from interpose.datasets.pack import STEP  # noqa: E402
 from interpose.errors import FileError, RequestError  # noqa: E402
-from interpose.geometry import rotations  # noqa: E402
 from interpose.methods import weights  # noqa: E402
 from interpose.methods.cae import run  # noqa: E402
 from interpose.models.cae import Infiller, to_image  # noqa: E402
-from interpose.skeletons import find_humanoid  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cae import (  # noqa: E402
     NETWORKS,
@@ -35,21 +31,8 @@ from interpose.training.windows import Windows  # noqa: E402
 
 
 @pytest.fixture(scope="module")
-def pack(cmu_walk):  # type: ignore[no-untyped-def]
-    body = find_humanoid(cmu_walk)
-    half = len(cmu_walk) // 2
-    return Pack(
-        "cmu",
-        np.rint(rotations.log(body.rotations(cmu_walk)) / STEP).astype(np.int16),
-        (body.root(cmu_walk) * body.scale).astype(np.float32),
-        np.tile(body.bones * body.scale, (2, 1, 1)).astype(np.float32),
-        np.tile(body.body, (2, 1, 1)).astype(np.float32),
-        np.array([0, half, len(cmu_walk)]),
-        np.array(["a", "b"]),
-        np.array(["02", "08"]),
-        np.array(["walk", "walk"]),
-        np.array(["train", "validation"]),
-    )
+def pack(walk_pack):  # type: ignore[no-untyped-def]
+    return walk_pack("cmu")
 
 
 @pytest.mark.parametrize(

@@ -74,6 +74,55 @@ def cmib(
     _export(export_cmib, run, packs, out, splits)
 
 
+@export.command
+def stmi_gan(
+    *,
+    run: Path,
+    packs: Path = Path("packs"),
+    out: Path = Path("weights/stmi-gan"),
+    splits: list[str] = [],  # noqa: B006
+) -> None:
+    """Write stmi-gan.onnx, its card stmi-gan.json, and the training log with its curves.
+
+    Try:
+      interpose export stmi-gan --run runs/stmi --packs packs --out weights/stmi-gan
+
+    Args:
+        run: the folder of the training run.
+        packs: the folder with the packs that it was trained on.
+        out: the folder for the weights.
+        splits: what it was trained on: train (the default), or train,validation.
+    """
+    with needs_torch("export a network"):
+        from interpose.training.export import export_stmi_gan
+    _export(export_stmi_gan, run, packs, out, splits)
+
+
+@export.command
+def seq2seq(
+    *,
+    run: Path,
+    packs: Path = Path("packs"),
+    out: Path,
+    splits: list[str] = [],  # noqa: B006
+) -> None:
+    """Write seq2seq.onnx, its card seq2seq.json, and the training log: a row of bench forecasting.
+
+    Try:
+      interpose export seq2seq --run runs/seq2seq --out runs/seq2seq/weights
+      interpose bench forecasting --weights runs/seq2seq/weights
+
+    Args:
+        run: the folder of the training run.
+        packs: the folder with the packs that it was trained on.
+        out: the folder for the weights.
+        splits: what it was trained on: train (the default), or train,validation.
+    """
+    with needs_torch("export a network"):
+        from interpose.training.export import export_seq2seq
+    _export(export_seq2seq, run, packs, out, splits)
+
+
 def _export(write: Callable[..., Any], run: Path, packs: Path, out: Path, splits: list[str]) -> None:
     """Export a run as its verb was told."""
     chosen = check_splits(splits)

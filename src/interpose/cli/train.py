@@ -80,8 +80,9 @@ def _train(
     splits: list[str],
     start: str | None,
     changes: list[str],
+    shipped: bool = True,
 ) -> None:
-    """Run a recipe as its verb was told."""
+    """Run a recipe as its verb was told. What is not shipped stays apart from the weights that users get."""
     from interpose.methods import weights
     from interpose.training.budget import Budget
 
@@ -89,8 +90,8 @@ def _train(
     begin = weights.card(start) if start else None
     recipe(load_packs(packs), out, Budget.parse(budget), changed, splits=chosen, start=begin, say=say)
     say(f"done: {out}")
-    # A study stays apart from the weights that users get.
-    there = out / "weights" if changes else Path("weights") / name
+    # So does a study.
+    there = Path("weights") / name if shipped and not changes else out / "weights"
     say(f"Next: interpose export {name} --run {out} --packs {packs} --out {there}")
 
 
@@ -153,3 +154,67 @@ def cmib(
     with needs_torch("train a network"):
         from interpose.training.cmib import CmibSettings, train_cmib
     _train(train_cmib, CmibSettings(), "cmib", packs, out, budget, splits, start, set)
+
+
+@train.command
+def stmi_gan(
+    *,
+    packs: Path = Path("packs"),
+    out: Path,
+    budget: str = "25m",
+    splits: list[str] = [],  # noqa: B006
+    start: str | None = None,
+    set: list[str] = [],  # noqa: B006
+) -> None:
+    """Train STMI-GAN of Hernandez Ruiz et al., on LAFAN1 and Bandai-Namco. An interrupted run goes on.
+
+    The rows of the paper's tables are settings of the same recipe.
+
+    Try:
+      interpose train stmi-gan --packs packs --out runs/stmi --budget 25m
+      interpose train stmi-gan --out runs/paper --set config=paper
+      interpose train stmi-gan --out runs/nogan --set config=paper --set branches=none
+
+    Args:
+        packs: the folder with the packs to train on: `interpose data pack` makes them.
+        out: the folder of the run: checkpoints and the log.
+        budget: device time or steps: 25m, 3h, 6000steps.
+        splits: train (the default); train,validation for a final run of fixed budget.
+        start: go on from these installed weights, by name, instead of from nothing.
+        set: change a setting of the recipe, for studies: name=value. May be repeated.
+    """
+    with needs_torch("train a network"):
+        from interpose.training.stmi_gan import StmiGanSettings, train_stmi_gan
+    _train(train_stmi_gan, StmiGanSettings(), "stmi-gan", packs, out, budget, splits, start, set)
+
+
+@train.command
+def seq2seq(
+    *,
+    packs: Path = Path("packs"),
+    out: Path,
+    budget: str = "25m",
+    splits: list[str] = [],  # noqa: B006
+    start: str | None = None,
+    set: list[str] = [],  # noqa: B006
+) -> None:
+    """Train the residual sequence-to-sequence network of Martinez et al., a row of bench forecasting.
+
+    On LAFAN1 and Bandai-Namco, with their labels. An interrupted run goes on where it stopped.
+
+    Try:
+      interpose train seq2seq --packs packs --out runs/seq2seq --budget 25m
+
+    Args:
+        packs: the folder with the packs to train on: `interpose data pack` makes them.
+        out: the folder of the run: checkpoints and the log.
+        budget: device time or steps: 25m, 3h, 6000steps.
+        splits: train (the default); train,validation for a final run of fixed budget.
+        start: go on from these installed weights, by name, instead of from nothing.
+        set: change a setting of the recipe, for studies: name=value. May be repeated.
+    """
+    with needs_torch("train a network"):
+        from interpose.training.seq2seq import Seq2SeqSettings, train_seq2seq
+    _train(
+        train_seq2seq, Seq2SeqSettings(), "seq2seq", packs, out, budget, splits, start, set, shipped=False
+    )

@@ -19,9 +19,12 @@ from interpose.errors import RequestError
 from interpose.methods.weights import Card
 from interpose.models.cae import Infiller
 from interpose.models.cmib import Cmib, CmibConfig
+from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig
+from interpose.models.stmi_gan import Generator, StmiGanConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
 from interpose.training.cae import NETWORKS
+from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 
 LICENCES = {
     "lafan1": "CC BY-NC-ND 4.0",
@@ -61,6 +64,30 @@ def export_cmib_onnx(model: Cmib, path: Path) -> None:
         "bones": (torch.rand(2, len(JOINTS)) + 0.1, {0: sizes[0]}),
     }
     _write_graph(model, inputs, ["positions_out", "rotation_out", "missed"], path)
+
+
+def export_stmi_gan_onnx(model: Generator, path: Path) -> None:
+    """Write STMI-GAN's generator as one graph, for any number of motions of its own length."""
+    shape = (2, model.config.frames, len(JOINTS), 3)
+    noise = torch.zeros(2, model.noises, model.config.frames, model.config.width)
+    clips = {0: _sizes(shape[1])[0]}
+    inputs = {
+        "positions": (torch.randn(shape), clips),
+        "observed": (torch.rand(shape) > 0.2, clips),
+        "noise": (noise, clips),
+    }
+    _write_graph(model, inputs, ["raw", "completed"], path)
+
+
+def export_seq2seq_onnx(model: Seq2Seq, path: Path) -> None:
+    """Write one step of the sequence-to-sequence network as a graph, for any number of motions."""
+    clips = {0: _sizes(4096)[0]}
+    inputs = {
+        "rotation": (torch.nn.functional.normalize(torch.randn(2, len(JOINTS), 4), dim=-1), clips),
+        "label": (torch.zeros(2, dtype=torch.long), clips),
+        "state": (torch.zeros(2, model.config.units), clips),
+    }
+    _write_graph(model, inputs, ["rotation_out", "state_out"], path)
 
 
 def _sizes(longest: int) -> dict[int, Any]:
@@ -164,6 +191,43 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     return card
 
 
+def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+    """Write `seq2seq.onnx`, `seq2seq.json`, the log and its curves into `out` from a run's folder."""
+    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    config = settings.pop("config")
+    model = Seq2Seq(Seq2SeqConfig(**{**config, "labels": tuple(config["labels"])}))
+    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
+    out.mkdir(parents=True, exist_ok=True)
+    export_seq2seq_onnx(model, out / "seq2seq.onnx")
+    log, earlier, _ = _history(folder)
+    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    hours = [entry["hours"] for entry in log]
+    curve = {"loss": (hours, [entry["loss"] for entry in log])}
+    line_plot(curve, "device hours", "squared, normalised", "Training of seq2seq", path=out / "loss.svg")
+    errors = {
+        f"first {frames / 30:g} s": (hours, [entry[f"degrees{frames}"] for entry in log])
+        for frames in (15, 30, 60, 120)
+    }
+    title = "Validation performers"
+    line_plot(errors, "device hours", "rotation error, degrees", title, path=out / "validation.svg")
+    card = Card(
+        name="seq2seq",
+        method="seq2seq",
+        description="Residual sequence-to-sequence network (Martinez et al. 2017), to compare forecasts with",
+        licence=_licence(packs),
+        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        tasks=[],
+        joints=list(JOINTS),
+        fps=30.0,
+        max_gap=0,
+        training=_training("seq2seq", settings, splits, log, earlier, model),
+        metrics={"validation": log[-1]},
+        labels=config["labels"],
+    )
+    card.save(out / "seq2seq.json")
+    return card
+
+
 def _check_free(out: Path, name: str) -> None:
     """One folder holds one network: its log and its curves have no name. RequestError otherwise."""
     if others := [path for path in out.glob("*.onnx") if path.stem != name]:
@@ -200,6 +264,45 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         paces=paces(packs, splits),
     )
     card.save(out / "cmib.json")
+    return card
+
+
+def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+    """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder."""
+    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    network: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value
+        for name, value in settings["network"].items()
+    }
+    config = StmiGanConfig(**network)
+    model = Generator(config)
+    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
+    out.mkdir(parents=True, exist_ok=True)
+    export_stmi_gan_onnx(model, out / "stmi-gan.onnx")
+    log, earlier, _ = _history(folder)
+    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    hours = [entry["hours"] for entry in log]
+    curve = {"generator": (hours, [entry["loss"] for entry in log])}
+    line_plot(curve, "device hours", "weighted loss", "Training of stmi-gan", path=out / "loss.svg")
+    moves = {
+        f"{q}. quarter of the forecast": (hours, [entry[f"moves{q}"] for entry in log]) for q in range(1, 5)
+    }
+    title = "Validation performers"
+    line_plot(moves, "device hours", "share of the truth's motion", title, path=out / "validation.svg")
+    card = Card(
+        name="stmi-gan",
+        method="stmi-gan",
+        description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
+        licence=_licence(packs),
+        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        tasks=["forecast", "fill", "recover"],
+        joints=list(JOINTS),
+        fps=config.fps,
+        max_gap=config.frames // 2,
+        training=_training("stmi-gan", settings, splits, log, earlier, model),
+        metrics={"validation": log[-1]},
+    )
+    card.save(out / "stmi-gan.json")
     return card
 
 

@@ -87,6 +87,21 @@ def restore(model: nn.Module, path: Path) -> None:
             value.copy_(torch.from_numpy(numpy_helper.to_array(held[name]).astype(np.float32)))
 
 
+@dataclass
+class Opponent:
+    """What a model is trained against: in every step it learns first.
+
+    Attributes:
+        model: the network.
+        loss: from a random generator and the fraction of the budget spent to a scalar loss.
+        optimizer: of its parameters; its learning rate follows the schedule of the run.
+    """
+
+    model: nn.Module
+    loss: Callable[[np.random.Generator, float], Tensor]
+    optimizer: torch.optim.Optimizer
+
+
 def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in names}
 
@@ -101,6 +116,7 @@ class Trainer:
         optimizer: makes the optimiser from the parameters; Adam without one.
         clip: the largest norm of the gradients.
         about: what else the card should say of the model; kept with the settings.
+        opponent: a network that the model plays against, for adversarial training.
     """
 
     def __init__(
@@ -115,12 +131,14 @@ class Trainer:
         optimizer: Callable[[list[nn.Parameter]], torch.optim.Optimizer] | None = None,
         clip: float | None = None,
         about: dict[str, Any] | None = None,
+        opponent: Opponent | None = None,
     ) -> None:
         self.model, self.loss, self.validate = model, loss, validate
         self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
         self.device = next(model.parameters()).device
         make = optimizer or (lambda some: torch.optim.Adam(some, settings.learning_rate))
         self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
+        self.opponent = opponent
         self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
         # Every process draws batches of its own.
         self.rng = np.random.default_rng([settings.seed, rank()])
@@ -136,6 +154,9 @@ class Trainer:
             self.model.load_state_dict(state["model"])
             self.averaged.load_state_dict(state["averaged"])
             self.optimizer.load_state_dict(state["optimizer"])
+            if self.opponent:
+                self.opponent.model.load_state_dict(state["opponent"])
+                self.opponent.optimizer.load_state_dict(state["opponent_optimizer"])
         except (RuntimeError, KeyError, EOFError, OSError, pickle.UnpicklingError) as reason:
             raise FileError(
                 f"cannot go on from {path}", str(reason).splitlines()[0], "Delete it or name another folder."
@@ -161,6 +182,9 @@ class Trainer:
             "seconds": self.budget.spent_seconds,
             "steps": self.budget.spent_steps,
         }
+        if self.opponent:
+            state["opponent"] = self.opponent.model.state_dict()
+            state["opponent_optimizer"] = self.opponent.optimizer.state_dict()
         for name, what in (("checkpoint.pt", state), ("averaged.pt", self.averaged.state_dict())):
             torch.save(what, self.folder / (name + ".new"))
             os.replace(self.folder / (name + ".new"), self.folder / name)
@@ -170,11 +194,11 @@ class Trainer:
         warm = min(1.0, max(fraction, 1e-4) / self.settings.warm_up)
         return self.settings.learning_rate * warm * 0.5 * (1 + math.cos(math.pi * fraction))
 
-    def _share(self) -> float | None:
+    def _share(self, model: nn.Module) -> float | None:
         """Average the gradients over all processes; the device time that all of them have spent."""
         if not dist.is_initialized():
             return None
-        gradients = [p.grad for p in self.model.parameters() if p.grad is not None]
+        gradients = [p.grad for p in model.parameters() if p.grad is not None]
         spent = gradients[0].new_tensor([self.budget.clock()])
         flat = torch.cat([spent, *(g.flatten() for g in gradients)])
         dist.all_reduce(flat)
@@ -196,12 +220,19 @@ class Trainer:
         self.budget.start(gpu=self.device.type == "cuda")
         told, losses = time.monotonic() - self.settings.every_seconds * 0.8, []
         while self.budget.fraction < 1:
-            for group in self.optimizer.param_groups:
-                group["lr"] = self._rate()
+            opponents = [self.opponent] if self.opponent else []
+            for optimizer in (self.optimizer, *(one.optimizer for one in opponents)):
+                for group in optimizer.param_groups:
+                    group["lr"] = self._rate()
+            for one in opponents:
+                one.optimizer.zero_grad(set_to_none=True)
+                one.loss(self.rng, self.budget.fraction).backward()
+                self._share(one.model)
+                one.optimizer.step()
             loss = self.loss(self.rng, self.budget.fraction)
             self.optimizer.zero_grad(set_to_none=True)
             loss.backward()
-            self.budget.step(self._share())
+            self.budget.step(self._share(self.model))
             if self.clip is not None:
                 nn.utils.clip_grad_norm_(self.model.parameters(), self.clip)
             self.optimizer.step()

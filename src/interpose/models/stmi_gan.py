@@ -1,0 +1,324 @@
+"""The spatio-temporal inpainting GAN of Hernandez Ruiz et al. 2019: positions with holes in, a motion out.
+
+`Generator` is the whole method: it aligns a motion, completes it and puts it back; it is what ONNX holds.
+`Discriminator` trains it. Which branches judge is a matter of the configuration: none is the paper's NoGAN.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from interpose.geometry.ground import turn
+from interpose.models.keys import neighbours, pick
+from interpose.skeletons import JOINTS
+from interpose.skeletons.body import PAIRS, facing
+
+VALUES = 3 * len(JOINTS)
+BRANCHES = ("base", "edm", "motion")
+ENDS = tuple(itertools.combinations(range(len(JOINTS)), 2))  # pairs of joints whose distance is looked at
+
+
+@dataclass(frozen=True)
+class StmiGanConfig:
+    """What the network is; the paper's is the default, for 22 joints instead of 17.
+
+    Attributes:
+        frames: of a window.
+        fps: at which it thinks; 20 frames of 4 s in the paper.
+        width: values that a frame is encoded into, four for each coordinate in the paper.
+        gates: gated blocks of the frame encoder, and of the decoder.
+        blocks: U-blocks one after the other.
+        channels: of the levels of a U-block, each half as large as the one before.
+        branches: what the discriminator looks at, of BRANCHES; () for a network without one.
+    """
+
+    frames: int = 20
+    fps: float = 5.0
+    width: int = 4 * VALUES
+    gates: int = 3
+    blocks: int = 4
+    channels: tuple[int, ...] = (32, 64, 96)
+    branches: tuple[str, ...] = BRANCHES
+
+
+PAPER = StmiGanConfig()
+# For users: 4 s at 30 fps, frame by frame, so with more levels to see as much time; a narrower code, as the
+# time that a window takes is what they wait for.
+DENSE = StmiGanConfig(frames=120, fps=30.0, width=128, channels=(16, 32, 64, 96, 96))
+CONFIGS = {"paper": PAPER, "dense": DENSE}
+
+
+class Gated(nn.Module):
+    """Two layers whose output takes the place of the input as far as a gate lets it (section 6, figure 4)."""
+
+    def __init__(self, width: int) -> None:
+        super().__init__()
+        self.first = nn.Linear(width, width // 2)
+        self.second = nn.Linear(width // 2, width)
+        self.gate = nn.Linear(width, width)
+
+    def forward(self, x: Tensor) -> Tensor:
+        share = torch.sigmoid(self.gate(x))
+        return share * self.second(torch.relu(self.first(x))) + (1 - share) * x
+
+
+class FrameNetwork(nn.Sequential):
+    """Each frame by itself: (..., into) to (..., out), through gated blocks `width` wide."""
+
+    def __init__(self, into: int, width: int, gates: int, out: int) -> None:
+        last = [] if out == width else [nn.Linear(width, out)]
+        super().__init__(nn.Linear(into, width), *(Gated(width) for _ in range(gates)), *last)
+
+
+class Noise(nn.Module):
+    """Adds noise (B, 1, T, H), as much to each channel as it learns; none at the start (Karras 2019)."""
+
+    def __init__(self, channels: int) -> None:
+        super().__init__()
+        self.scale = nn.Parameter(torch.zeros(channels, 1, 1))
+
+    def forward(self, x: Tensor, noise: Tensor) -> Tensor:
+        return torch.addcmul(x, self.scale.to(x.dtype), noise[..., : x.shape[-2], : x.shape[-1]])
+
+
+class UBlock(nn.Module):
+    """Refines a motion (B, 1, T, H) that is written as an image: down through the levels and up again."""
+
+    def __init__(self, channels: tuple[int, ...]) -> None:
+        super().__init__()
+        into = (channels[0], *channels[:-1])
+        self.lift = nn.Conv2d(1, channels[0], 1)
+        self.down = nn.ModuleList(nn.Conv2d(a, b, 3, 2, 1) for a, b in zip(into, channels))
+        # On the way up what the level was on the way down is seen beside what comes from below.
+        above = (2 * channels[i] if i < len(channels) - 1 else channels[i] for i in range(len(channels)))
+        self.up = nn.ModuleList(
+            nn.ConvTranspose2d(a, b, 3, 2, 1, 1) for a, b in reversed(list(zip(above, into)))
+        )
+        self.noises = nn.ModuleList(Noise(n) for n in (*into, *(m.in_channels for m in self.up)))
+        self.flat = nn.Conv2d(2 * channels[0], 1, 1)
+
+    def forward(self, image: Tensor, noise: Tensor) -> Tensor:
+        """image: (B, 1, T, H); noise: (B, 2 * levels, T, H)."""
+        levels = len(self.down)
+        x = self.lift(image)
+        noise = noise.to(x.dtype)
+        skips = []
+        for i, layer in enumerate(self.down):
+            skips.append(x)
+            x = functional.leaky_relu(layer(self.noises[i](x, noise[:, [i]])), 0.2)
+        for i, layer in enumerate(self.up):
+            x = self.noises[levels + i](x, noise[:, [levels + i]])
+            skip = skips.pop()
+            # Twice the size, less the last row or column where halving had rounded up.
+            x = functional.leaky_relu(layer(x)[..., : skip.shape[-2], : skip.shape[-1]], 0.2)
+            x = torch.cat([x, skip], dim=1)
+        return image + self.flat(x)
+
+
+@dataclass
+class Frame:
+    """Where a motion lies: `origin` (B, 1, 1, 3) in metres and `yaw` (B, 1, 1), of its first known pose."""
+
+    origin: Tensor
+    yaw: Tensor
+
+    @classmethod
+    def of(cls, positions: Tensor, observed: Tensor) -> Frame:
+        """Of the first frame whose hips and facing are observed; else of all that is, facing along Z.
+
+        positions: (B, T, 22, 3), observed: the same, whether each coordinate is known.
+        """
+        whole = observed.all(dim=-1)
+        pair = torch.stack([whole[..., left] & whole[..., right] for left, right in PAIRS], dim=-1).any(-1)
+        placed = whole[..., 0] & pair
+        first, any_placed = placed.int().argmax(dim=1, keepdim=True), placed.any(dim=1)
+        rows = first[..., None].expand(-1, 1, 3)
+        hips = torch.gather(positions[:, :, 0], 1, rows)[:, 0]
+        known = torch.where(observed, positions, 0.0).sum(dim=(1, 2))
+        mean = known / observed.sum(dim=(1, 2)).clamp(min=1)
+        yaw = pick(facing(positions, whole), first)[:, 0]
+        origin = torch.where(any_placed[:, None], hips, mean)
+        return cls(origin[:, None, None], torch.where(any_placed, yaw, 0.0)[:, None, None])
+
+    def align(self, positions: Tensor) -> Tensor:
+        """The motion with the first pose's hips in the origin, facing along Z."""
+        return turn(positions - self.origin, -self.yaw)
+
+    def undo(self, positions: Tensor) -> Tensor:
+        return turn(positions, self.yaw) + self.origin
+
+
+# Frames over which what the network gets wrong of a pose is taken to fade where nothing comes after it.
+FADE = 15
+
+
+def settle(answer: Tensor, positions: Tensor, observed: Tensor) -> Tensor:
+    """The answer (B, T, 22, 3), brought into what is observed (B, T, 22) of the positions without a jump.
+
+    What is wrong at the last and first known frame around a hole is taken to be wrong inside as well, in
+    between linearly, of the hips and of the other joints relative to them. Where nothing comes after, the
+    hips stay off by as much, so that the way goes on from where it was, and poses become the network's own.
+    """
+    clips, length, joints, _ = answer.shape
+
+    def rows(motion: Tensor) -> Tensor:
+        """(B * 22 * 3, T): the hips, and the others as they lie around them."""
+        around = torch.cat([motion[:, :, :1], motion[:, :, 1:] - motion[:, :, :1]], dim=2)
+        return around.flatten(2).transpose(1, 2).flatten(0, 1)
+
+    known = (observed & observed[:, :, :1])[..., None].expand(-1, -1, -1, 3)
+    known = known.flatten(2).transpose(1, 2).flatten(0, 1)
+    wrong = torch.where(known, rows(positions) - rows(answer), 0.0)
+    last, first = neighbours(known)
+    frame = torch.arange(length, device=answer.device)
+    since = torch.abs(frame - last)
+    between = first > last
+    share = since / torch.where(between, first - last, 1)
+    hips = (torch.arange(clips * 3 * joints, device=answer.device) % (3 * joints) < 3)[:, None]
+    kept = torch.where(hips, torch.ones_like(share), torch.clamp(1 - since / FADE, min=0) ** 2)
+    added = torch.where(between, 1 - share, kept) * pick(wrong, last)
+    added = added + torch.where(between, share, 0.0) * pick(wrong, first)
+    moved = (rows(answer) + added).unflatten(0, (clips, 3 * joints)).transpose(1, 2)
+    moved = moved.unflatten(2, (joints, 3))
+    moved = torch.cat([moved[:, :, :1], moved[:, :, 1:] + moved[:, :, :1]], dim=2)
+    return torch.where(observed[..., None], positions, moved)
+
+
+class Generator(nn.Module):
+    """A frame encoder, U-blocks on what it writes, and a frame decoder, within the alignment (section 4.1).
+
+    Positions are metres of a body scaled to the canonical leg, Y up. Unobserved coordinates may hold
+    anything finite; they have no influence.
+    """
+
+    mean: Tensor
+    std: Tensor
+
+    def __init__(self, config: StmiGanConfig = PAPER) -> None:
+        super().__init__()
+        self.config = config
+        self.encoder = FrameNetwork(2 * VALUES, config.width, config.gates, config.width)
+        self.blocks = nn.ModuleList(UBlock(config.channels) for _ in range(config.blocks))
+        self.decoder = FrameNetwork(config.width, config.width, config.gates, VALUES)
+        # One for each axis, as in the public code.
+        self.register_buffer("mean", torch.zeros(3))
+        self.register_buffer("std", torch.ones(3))
+
+    @property
+    def noises(self) -> int:
+        """How many images of noise a motion takes."""
+        return 2 * len(self.config.channels) * self.config.blocks
+
+    def aligned(self, motion: Tensor, observed: Tensor, noise: Tensor) -> Tensor:
+        """The same as `forward` on motions that are aligned already."""
+        x = torch.where(observed, (motion - self.mean) / self.std, 0.0)
+        image = self.encoder(torch.cat([x.flatten(2), observed.flatten(2).to(x.dtype)], dim=2))[:, None]
+        for block, part in zip(self.blocks, noise.chunk(self.config.blocks, dim=1)):
+            image = block(image, part)
+        answer = self.decoder(image[:, 0]).unflatten(2, (len(JOINTS), 3))
+        return answer * self.std + self.mean
+
+    def forward(self, positions: Tensor, observed: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
+        """Complete motions.
+
+        Args:
+            positions: (B, T, 22, 3).
+            observed: (B, T, 22, 3) booleans. Where a joint's x is known without its z, or the other way
+                round, the first pose should face along Z: the axes of the alignment are the world's then.
+            noise: (B, noises, T, width) standard normal; 0 for the most likely answer.
+
+        Returns:
+            (B, T, 22, 3) the network's own motion, also where it is observed; and the same settled into the
+            joints of which everything is observed.
+        """
+        positions = torch.where(observed, positions, 0.0)
+        frame = Frame.of(positions, observed)
+        # A coordinate that is unknown must not come into another by the turn.
+        positions = torch.where(observed, positions, frame.origin)
+        raw = frame.undo(self.aligned(frame.align(positions), observed, noise))
+        return raw, settle(raw, positions, observed.all(dim=-1))
+
+
+def distances(motion: Tensor) -> Tensor:
+    """(B, T, P) metres between the joints (B, T, 22, 3) of each of the pairs ENDS: a distance matrix."""
+    a, b = (torch.tensor(side, device=motion.device) for side in zip(*ENDS))
+    # The root of nothing has no gradient.
+    return ((motion[:, :, a] - motion[:, :, b]).square().sum(dim=-1) + 1e-8).sqrt()
+
+
+class Residual(nn.Module):
+    """A residual CNN that tells features of an image (B, 1, T, H): (B, 3 * `features`).
+
+    Blocks of two convolutions and a shortcut, each halving the image; what each says, averaged over time,
+    is transformed and put beside the others' (section 6).
+    """
+
+    def __init__(self, height: int, channels: tuple[int, ...] = (32, 64, 96), features: int = 64) -> None:
+        super().__init__()
+        into = (1, *channels[:-1])
+        self.first = nn.ModuleList(nn.Conv2d(a, b, 3, 2, 1) for a, b in zip(into, channels))
+        self.second = nn.ModuleList(nn.Conv2d(b, b, 3, 1, 1) for b in channels)
+        self.short = nn.ModuleList(nn.Conv2d(a, b, 1, 2) for a, b in zip(into, channels))
+        heights = [-(-height // 2 ** (i + 1)) for i in range(len(channels))]
+        self.narrow = nn.ModuleList(nn.Conv2d(b, 8, 1) for b in channels)
+        self.say = nn.ModuleList(nn.Linear(8 * h, features) for h in heights)
+
+    def forward(self, image: Tensor) -> Tensor:
+        x, said = image, []
+        for first, second, short, narrow, say in zip(
+            self.first, self.second, self.short, self.narrow, self.say
+        ):
+            inner = second(functional.leaky_relu(first(x), 0.2))
+            x = functional.leaky_relu(inner + short(x), 0.2)
+            told = functional.leaky_relu(narrow(x), 0.2).mean(dim=2)
+            said.append(functional.leaky_relu(say(told.flatten(1)), 0.2))
+        return torch.cat(said, dim=1)
+
+
+class Discriminator(nn.Module):
+    """How real motions look: one score (B,) from all branches.
+
+    `base` looks at poses as an encoder of its own writes them, `edm` at the distances between joints,
+    `motion` at the steps of both coordinates and distances from frame to frame (section 4.1).
+    """
+
+    mean: Tensor
+    std: Tensor
+    sizes: Tensor
+
+    def __init__(self, config: StmiGanConfig = PAPER) -> None:
+        super().__init__()
+        self.config = config
+        heights = {"base": config.width, "edm": len(ENDS), "motion": VALUES + len(ENDS)}
+        self.encoder = FrameNetwork(VALUES, config.width, config.gates, config.width)
+        self.branches = nn.ModuleDict({name: Residual(heights[name]) for name in config.branches})
+        self.score = nn.Linear(3 * 64 * max(len(config.branches), 1), 1)
+        self.register_buffer("mean", torch.zeros(3))
+        self.register_buffer("std", torch.ones(3))
+        # How large distances, steps of coordinates and steps of distances usually are.
+        self.register_buffer("sizes", torch.ones(3))
+
+    def seen(self, motion: Tensor) -> dict[str, Tensor]:
+        """What each branch looks at of aligned motions (B, T, 22, 3) in metres: (B, T or T - 1, H)."""
+        apart = distances(motion)
+        steps = torch.cat(
+            [motion.diff(dim=1).flatten(2) / self.sizes[1], apart.diff(dim=1) / self.sizes[2]], dim=2
+        )
+        found = {
+            "base": ((motion - self.mean) / self.std).flatten(2),
+            "edm": apart / self.sizes[0],
+            "motion": steps,
+        }
+        return {name: found[name] for name in self.config.branches}
+
+    def forward(self, seen: dict[str, Tensor]) -> Tensor:
+        said = [
+            branch((self.encoder(seen[name]) if name == "base" else seen[name])[:, None])
+            for name, branch in self.branches.items()
+        ]
+        return self.score(torch.cat(said, dim=1))[:, 0]

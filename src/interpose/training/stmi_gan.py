@@ -1,0 +1,332 @@
+"""The recipe of STMI-GAN (Hernandez Ruiz et al. 2019, sections 4.2 and 6), on LAFAN1 and Bandai-Namco.
+
+The rows of its table 1 are settings of it:
+
+    STMI-GAN       nothing; config=paper for the network of the tables, 20 frames of 4 s
+    NoGAN          branches=none
+    Base disc      branches=base
+    +EDM disc      branches=base,edm
+    +Motion disc   branches=base,motion
+
+The losses are sums over a motion of 20 frames, as in the paper; longer ones count as much as those.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from interpose.datasets import Pack
+from interpose.errors import RequestError, unknown
+from interpose.methods.weights import Card
+from interpose.models.stmi_gan import (
+    BRANCHES,
+    CONFIGS,
+    ENDS,
+    PAPER,
+    Discriminator,
+    Frame,
+    Generator,
+    StmiGanConfig,
+    distances,
+)
+from interpose.observation.corruption import LIMBS, gap_mask
+from interpose.skeletons import JOINTS, PARENTS
+from interpose.training.budget import Budget
+from interpose.training.deconvolution import quicken
+from interpose.training.loop import Opponent, Settings, Trainer, pick_device, processes, restore
+from interpose.training.windows import Windows
+
+DATASETS = ("lafan1", "bandai")
+# Whose distances to all other joints tell most actions apart: hands, feet and head.
+EXTREMITIES = {JOINTS.index(name) for name in ("LeftHand", "RightHand", "LeftToe", "RightToe", "Head")}
+LIMB_PAIRS = [i for i, pair in enumerate(ENDS) if EXTREMITIES & set(pair)]
+BONE_PAIRS = [ENDS.index((parent, joint)) for joint, parent in enumerate(PARENTS) if parent >= 0]
+
+
+@dataclass
+class StmiGanSettings(Settings):
+    """The paper's recipe, its step-wise learning rate apart: here it follows the budget."""
+
+    config: str = "dense"  # one of CONFIGS
+    branches: str = ",".join(BRANCHES)  # of the discriminator; none for NoGAN, which is told the whole truth
+    batch: int = 32  # of all processes together; the paper: 128
+    forecasts: float = 0.5  # share of the motions of which the second half is hidden
+    reconstruction: float = 1.0
+    limbs: float = 0.1
+    bones: float = 1.0
+    adversarial: float = 10.0
+    gamma: float = 10.0  # of the R1 penalty
+    every: int = 8  # steps from one R1 penalty to the next; each weighs as many times as much
+    tallest: float = 1.3  # bodies are made smaller or larger by up to this factor
+
+    def __post_init__(self) -> None:
+        if self.config not in CONFIGS:
+            raise unknown("config", self.config, CONFIGS)
+        if bad := [name for name in self.looks if name not in BRANCHES]:
+            raise RequestError(
+                f"unknown branch: {bad[0]}",
+                f"the discriminator has {', '.join(BRANCHES)}",
+                "Write --set branches=base,edm,motion, or branches=none.",
+            )
+
+    @property
+    def looks(self) -> tuple[str, ...]:
+        """The branches of the discriminator."""
+        return () if self.branches == "none" else tuple(self.branches.split(","))
+
+    @property
+    def network(self) -> StmiGanConfig:
+        return replace(CONFIGS[self.config], branches=self.looks)
+
+
+def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> np.ndarray:
+    """What is observed (B, T, 22, 3): of some motions the first half, of the others all but something.
+
+    That is one of: whole frames, joints or limbs all along, single coordinates, each kept with a probability
+    of .25 to .75. The first and the last frame stay. Where frames are dense, forecasts begin after a sixth to
+    two thirds of the motion, for clips that are short, and gaps are one kind more.
+    """
+    frames, joints, dense = settings.network.frames, len(JOINTS), settings.config == "dense"
+    known = np.ones((batch, frames, joints, 3), bool)
+    for motion in known:
+        if rng.random() < settings.forecasts:
+            motion[rng.integers(frames // 6, 2 * frames // 3) if dense else frames // 2 :] = False
+            continue
+        keep = rng.uniform(0.25, 0.75)
+        kinds = ("frames", "joints", "limbs", "values", *(("gap",) if dense else ()))
+        kind = kinds[rng.integers(len(kinds))]
+        if kind == "frames":
+            motion[:] = (rng.random(frames) < keep)[:, None, None]
+        elif kind == "joints":
+            motion[:] = (rng.random(joints) < keep)[:, None]
+        elif kind == "limbs":
+            for limb in LIMBS:
+                motion[:, list(limb)] = rng.random() < keep
+        elif kind == "values":
+            motion[:] = rng.random(motion.shape) < keep
+        else:
+            motion[:] = gap_mask(rng, 1, frames, joints, frames / 4, frames / 8)[0, ..., None]
+        motion[[0, -1]] = True
+    return known
+
+
+def draw(rng: np.random.Generator, windows: Windows, settings: StmiGanSettings, batch: int) -> Tensor:
+    """Motions (B, T, 22, 3) in metres of bodies small and tall, half of them mirrored.
+
+    Of 4 s the paper's network sees one frame at random of each block of ten: of six at 30 fps.
+    """
+    positions = windows.draw(rng, batch)
+    frames = settings.network.frames
+    block = windows.length // frames
+    if block > 1:
+        chosen = np.arange(frames) * block + rng.integers(block, size=(batch, frames))
+        index = torch.from_numpy(chosen).to(positions.device)
+        positions = positions[torch.arange(batch, device=positions.device)[:, None], index]
+    # As often smaller than taller: .7 to 1.3, as in the paper.
+    tall = rng.uniform(2.0 - settings.tallest, settings.tallest, batch)
+    return positions * torch.from_numpy(tall).to(positions)[:, None, None, None]
+
+
+@dataclass
+class Motions:
+    """What is trained on: aligned motions (B, T, 22, 3), what is observed of them, and the network's."""
+
+    truth: Tensor
+    observed: Tensor
+    made: Tensor
+
+
+class Game:
+    """Generator and discriminator, and what each of them wants (equations 1 to 6)."""
+
+    def __init__(
+        self,
+        generator: Generator,
+        discriminator: Discriminator,
+        windows: Windows,
+        settings: StmiGanSettings,
+        batch: int,
+    ) -> None:
+        self.generator, self.discriminator = generator, discriminator
+        self.windows, self.settings, self.batch = windows, settings, batch
+        self.motions: Motions | None = None
+        self.turn = 0
+
+    def play(self, rng: np.random.Generator) -> Motions:
+        """Motions of the data, with holes, and what the generator makes of them."""
+        positions = draw(rng, self.windows, self.settings, self.batch)
+        observed = torch.from_numpy(corrupt(rng, self.settings, self.batch)).to(positions.device)
+        truth = Frame.of(positions, observed).align(positions)
+        with torch.autocast(truth.device.type, torch.bfloat16):
+            made = self.generator.aligned(truth, observed, noise(self.generator, len(truth), truth.device))
+        return Motions(truth, observed, made.float())
+
+    def opponent_loss(self, rng: np.random.Generator, fraction: float) -> Tensor:
+        """Of the discriminator: which motions are the data's, and the R1 penalty on those (equation 4).
+
+        The penalty is on what the branches see, which is of one size, and not on metres: so it weighs the
+        same at every frame rate.
+        """
+        self.motions = self.play(rng)
+        penalised = self.turn % self.settings.every == 0
+        self.turn += 1
+        with torch.autocast(self.motions.truth.device.type, torch.bfloat16):
+            fake = self.discriminator(self.discriminator.seen(self.motions.made.detach())).float()
+            seen = {
+                name: value.requires_grad_(penalised)
+                for name, value in self.discriminator.seen(self.motions.truth).items()
+            }
+            real = self.discriminator(seen).float()
+        loss = functional.softplus(fake).mean() + functional.softplus(-real).mean()
+        if penalised:
+            slopes = torch.autograd.grad(real.sum(), list(seen.values()), create_graph=True)
+            steep = torch.stack([slope.float().square().sum(dim=(1, 2)) for slope in slopes]).sum(dim=0)
+            loss = loss + 0.5 * self.settings.gamma * self.settings.every * steep.mean()
+        return loss
+
+    def loss(self, rng: np.random.Generator, fraction: float) -> Tensor:
+        """Of the generator (equations 1, 2, 3 and 5)."""
+        asked = self.settings
+        motions = self.motions if asked.looks and self.motions else self.play(rng)
+        loss = self.told(motions)
+        if asked.looks:
+            with torch.autocast(motions.made.device.type, torch.bfloat16):
+                fake = self.discriminator(self.discriminator.seen(motions.made)).float()
+            loss = loss + asked.adversarial * functional.softplus(-fake).mean()
+        return loss
+
+    def told(self, motions: Motions) -> Tensor:
+        """What the truth tells: visible coordinates, distances of the extremities, and lengths of bones."""
+        asked, frames = self.settings, motions.truth.shape[1]
+        seen = motions.observed if asked.looks else torch.ones_like(motions.observed)
+        wrong = torch.where(seen, (motions.made - motions.truth) / self.generator.std, 0.0)
+        size = self.generator.std.mean()
+        apart, true = distances(motions.made) / size, distances(motions.truth) / size
+        off = (apart - true).abs()
+        whole = seen.all(dim=-1)
+        a, b = (torch.tensor(side, device=whole.device) for side in zip(*ENDS))
+        pairs = (whole[..., a] & whole[..., b])[..., LIMB_PAIRS]
+        per = PAPER.frames / frames
+        return (
+            # The norm of a motion grows with the root of its length, the sums with the length.
+            asked.reconstruction * (per * wrong.square().sum(dim=(1, 2, 3)) + 1e-8).sqrt().mean()
+            + asked.limbs * per * (off[..., LIMB_PAIRS] * pairs).sum(dim=(1, 2)).mean()
+            + asked.bones * per * off[..., BONE_PAIRS].sum(dim=(1, 2)).mean()
+        )
+
+
+def noise(generator: Generator, batch: int, device: torch.device) -> Tensor:
+    """Noise for a batch, standard normal."""
+    config = generator.config
+    return torch.randn(batch, generator.noises, config.frames, config.width, device=device)
+
+
+@torch.no_grad()
+def fit_normaliser(
+    generator: Generator, discriminator: Discriminator, windows: Windows, settings: StmiGanSettings
+) -> None:
+    """Mean and deviation of each axis over aligned motions, and how large distances and steps are."""
+    rng = np.random.default_rng(settings.seed)
+    positions = torch.cat([draw(rng, windows, settings, 100) for _ in range(10)])
+    motion = Frame.of(positions, torch.ones_like(positions, dtype=torch.bool)).align(positions)
+    for network in (generator, discriminator):
+        network.mean.copy_(motion.mean(dim=(0, 1, 2)))
+        network.std.copy_(motion.std(dim=(0, 1, 2)))
+    apart = distances(motion)
+    found = (apart, motion.diff(dim=1), apart.diff(dim=1))
+    discriminator.sizes.copy_(torch.stack([value.square().mean().sqrt() for value in found]))
+
+
+def train_stmi_gan(
+    packs: Sequence[Pack],
+    folder: Path,
+    budget: Budget,
+    settings: StmiGanSettings | None = None,
+    splits: Sequence[str] = ("train",),
+    start: Card | None = None,
+    say: Callable[[str], None] = print,
+) -> Generator:
+    """Train, or go on training, in `folder`; the averaged generator comes back. Arguments as in `train_cae`.
+
+    A run that starts from trained weights begins with a discriminator that knows nothing.
+    """
+    settings = settings or StmiGanSettings()
+    device = pick_device()
+    torch.manual_seed(settings.seed)
+    packs = [pack for pack in packs if str(pack.dataset) in DATASETS]
+    windows = Windows(packs, splits, 120, device)
+    held_out = Windows(packs, ("validation",), 120, device).spread(96)
+    generator, discriminator = (make(settings.network).to(device) for make in (Generator, Discriminator))
+    fit_normaliser(generator, discriminator, windows, settings)
+    if start:
+        restore(generator, start.onnx)
+    if device.type == "cpu":
+        quicken(generator)
+    for network in (generator, discriminator):
+        network.to(memory_format=torch.channels_last)
+    game = Game(generator, discriminator, windows, settings, max(1, settings.batch // processes()))
+
+    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
+        return torch.optim.NAdam(parameters, settings.learning_rate)
+
+    opponent = Opponent(discriminator, game.opponent_loss, optimizer(list(discriminator.parameters())))
+    trainer = Trainer(
+        generator,
+        game.loss,
+        lambda averaged: validate(averaged, held_out),
+        folder,
+        budget,
+        settings,
+        say,
+        optimizer=optimizer,
+        about={"network": asdict(settings.network)},
+        opponent=opponent if settings.looks else None,
+    )
+    if start:
+        trainer.follow(start)
+    say(f"{settings.config}, {windows.frames:,} frames of {', '.join(splits)}, on {device}")
+    if trainer.resume():
+        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
+    return trainer.run()
+
+
+@torch.no_grad()
+def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
+    """Of forecasts of the second half of windows (n, 120, 22, 3) in metres.
+
+    How far joints are off there in cm, and in the part that is seen; the ratio to the last pose held; and how
+    much joints move in each quarter of the forecast, as a share of how much the truth does.
+    """
+    assert isinstance(model, Generator)
+    frames = model.config.frames
+    truth = positions[:, :: positions.shape[1] // frames]
+    observed = torch.ones_like(truth, dtype=torch.bool)
+    half = frames // 2
+    observed[:, half:] = False
+    still = truth.new_zeros(len(truth), model.noises, frames, model.config.width)
+    parts = (slice(at, at + 16) for at in range(0, len(truth), 16))
+    made = torch.cat([model(truth[part], observed[part], still[part])[0] for part in parts])
+    off = 100 * (made - truth).norm(dim=-1)
+    held = 100 * (truth[:, half - 1 : half] - truth[:, half:]).norm(dim=-1)
+    figures = {
+        "seen": float(off[:, :half].mean()),
+        "forecast": float(off[:, half:].mean()),
+        "ratio": float(off[:, half:].mean() / held.mean()),
+    }
+    for quarter in range(4):
+        part = slice(half + quarter * half // 4 - 1, half + (quarter + 1) * half // 4)
+        moved = [_stir(motion[:, part]) for motion in (made, truth)]
+        figures[f"moves{quarter + 1}"] = float(moved[0] / moved[1])
+    return figures
+
+
+def _stir(motion: Tensor) -> Tensor:
+    """Mean step of joints relative to the hips."""
+    return (motion - motion[:, :, :1]).diff(dim=1).norm(dim=-1).mean()

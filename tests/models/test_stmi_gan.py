@@ -1,0 +1,155 @@
+"""STMI-GAN: the alignment, what is hidden, noise, what the branches see, and the graph that ships."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from interpose.geometry.ground import turn  # noqa: E402
+from interpose.models.stmi_gan import (  # noqa: E402
+    DENSE,
+    PAPER,
+    Discriminator,
+    Frame,
+    Generator,
+    StmiGanConfig,
+    distances,
+    settle,
+)
+
+SMALL = StmiGanConfig(frames=20, width=40, gates=1, blocks=2, channels=(4, 6))
+
+
+@pytest.fixture(scope="module")
+def generator():  # type: ignore[no-untyped-def]
+    torch.manual_seed(0)
+    model = Generator(SMALL).double().eval()
+    # As if noise had been learned.
+    with torch.no_grad():
+        for name, value in model.named_parameters():
+            if name.endswith("scale"):
+                value.fill_(0.3)
+    return model
+
+
+@pytest.fixture(scope="module")
+def motion(walk):  # type: ignore[no-untyped-def]
+    """(1, 20, 22, 3) a real walk, six frames of 30 fps apart."""
+    return walk[:, :120:6]
+
+
+@pytest.fixture(scope="module")
+def forecast(motion):  # type: ignore[no-untyped-def]
+    observed = torch.ones_like(motion, dtype=torch.bool)
+    observed[:, 10:] = False
+    return observed
+
+
+def noise(model, batch=1, scale=1.0):  # type: ignore[no-untyped-def]
+    config = model.config
+    made = np.random.default_rng(1).standard_normal((batch, model.noises, config.frames, config.width))
+    return torch.from_numpy(scale * made)
+
+
+def test_alignment_is_undone_to_the_last_bit_of_a_micron(motion, forecast):
+    frame = Frame.of(motion, forecast)
+    aligned = frame.align(motion)
+    assert torch.allclose(aligned[0, 0, 0], torch.zeros(3, dtype=aligned.dtype), atol=1e-12)
+    assert torch.allclose(frame.undo(aligned), motion, atol=1e-9)
+
+
+def test_the_answer_follows_turns_and_moves(generator, motion, forecast):
+    z = noise(generator)
+    answer = generator(motion, forecast, z)
+    yaw, away = torch.tensor(1.1, dtype=motion.dtype), motion.new_tensor([3.0, 0.0, -2.0])
+    moved = generator(turn(motion, yaw) + away, forecast, z)
+    for one, other in zip(answer, moved):
+        assert torch.allclose(turn(one, yaw) + away, other, atol=1e-7)
+
+
+def test_what_is_hidden_has_no_influence(generator, motion, forecast):
+    z = noise(generator)
+    spoiled = torch.where(forecast, motion, 1e3 * torch.randn_like(motion))
+    for one, other in zip(generator(motion, forecast, z), generator(spoiled, forecast, z)):
+        assert torch.equal(one, other)
+
+
+def test_where_no_pose_is_whole_what_is_known_still_counts(generator, motion):
+    """Single coordinates: no first pose tells where the body is and faces."""
+    observed = torch.rand(motion.shape, generator=torch.Generator().manual_seed(3)) < 0.3
+    raw, completed = generator(motion, observed, noise(generator))
+    assert torch.isfinite(raw).all()
+    nothing = torch.zeros_like(observed)
+    assert torch.isfinite(generator(motion, nothing, noise(generator))[1]).all()
+    assert torch.equal(completed[observed.all(-1)], motion[observed.all(-1)])
+
+
+def test_single_coordinates_follow_moves(generator, motion):
+    observed = torch.rand(motion.shape, generator=torch.Generator().manual_seed(4)) < 0.5
+    observed[:, 0] = True
+    away = motion.new_tensor([3.0, 0.0, -2.0])
+    one, other = (generator(some, observed, noise(generator))[0] for some in (motion, motion + away))
+    assert torch.allclose(one + away, other, atol=1e-7)
+
+
+def test_noise_makes_the_difference_and_grows_with_the_temperature(generator, motion, forecast):
+    still = generator(motion, forecast, noise(generator, scale=0.0))[0]
+    assert torch.equal(still, generator(motion, forecast, noise(generator, scale=0.0))[0])
+    little, much = (
+        (generator(motion, forecast, noise(generator, scale=s))[0] - still).norm() for s in (0.1, 1.0)
+    )
+    assert 0 < little < 0.3 * much
+
+
+def test_a_new_network_injects_no_noise(motion, forecast):
+    model = Generator(SMALL).double()
+    one, other = (model(motion, forecast, noise(model, scale=s))[0] for s in (0.0, 1.0))
+    assert torch.equal(one, other)
+
+
+@pytest.mark.parametrize("config", [PAPER, DENSE], ids=["paper", "dense"])
+def test_configurations(config):
+    model = Generator(config)
+    shape = (1, config.frames, 22, 3)
+    with torch.no_grad():
+        raw, _ = model(torch.randn(shape), torch.rand(shape) < 0.5, noise(model).float())
+        assert raw.shape == shape
+        judge = Discriminator(config)
+        assert judge(judge.seen(torch.randn(3, *shape[1:]))).shape == (3,)
+    # 20 frames of 4 s, or 120.
+    assert config.frames / config.fps == 4.0
+
+
+def test_settling_meets_what_is_known_and_keeps_the_way(motion):
+    """Without a jump: the answer is off by as much just inside of a hole as at its edge."""
+    observed = torch.ones(motion.shape[:-1], dtype=torch.bool)
+    observed[:, 8:14] = False
+    off = motion.new_tensor([0.3, 0.1, -0.2])
+    assert torch.allclose(settle(motion + off, motion, observed), motion, atol=1e-12)
+    observed[:, 8:] = False
+    assert torch.allclose(settle(motion + off, motion, observed), motion, atol=1e-12)
+    lost = torch.ones_like(observed)
+    lost[..., 7] = False
+    settled = settle(motion + off, motion, lost)
+    assert torch.equal(settled[..., :7, :], motion[..., :7, :])
+
+
+def test_distances_are_the_same_from_everywhere(motion):
+    assert distances(motion).shape[-1] == 22 * 21 // 2
+    moved = turn(motion, torch.tensor(0.7, dtype=motion.dtype)) + 5.0
+    assert torch.allclose(distances(moved), distances(motion), atol=1e-6)
+    assert torch.allclose(distances(motion)[0, 0, 0], (motion[0, 0, 0] - motion[0, 0, 1]).norm(), atol=1e-6)
+
+
+def test_branches_see_what_they_are_named_after(motion):
+    judge = Discriminator(SMALL).double()
+    moved = motion + 1.0
+    here, there = judge.seen(motion), judge.seen(moved)
+    assert not torch.allclose(here["base"], there["base"])
+    assert torch.allclose(here["edm"], there["edm"], atol=1e-6)
+    assert torch.allclose(here["motion"], there["motion"], atol=1e-6)
+    back = judge.seen(motion.flip(1))
+    assert torch.allclose(back["edm"].flip(1), here["edm"])
+    assert torch.allclose(-back["motion"].flip(1), here["motion"])

@@ -1,0 +1,161 @@
+"""STMI-GAN's recipe: what is hidden, what the losses count, and a run that learns, stops and goes on."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("onnx")
+
+from interpose.errors import RequestError  # noqa: E402
+from interpose.methods import weights  # noqa: E402
+from interpose.methods.stmi_gan import StmiGan, run, run_long  # noqa: E402
+from interpose.models.stmi_gan import PAPER, Discriminator, Generator  # noqa: E402
+from interpose.training import stmi_gan  # noqa: E402
+from interpose.training.budget import Budget  # noqa: E402
+from interpose.training.export import export_stmi_gan  # noqa: E402
+from interpose.training.stmi_gan import (  # noqa: E402
+    Game,
+    Motions,
+    StmiGanSettings,
+    corrupt,
+    draw,
+    fit_normaliser,
+    train_stmi_gan,
+)
+from interpose.training.windows import Windows  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def pack(walk_pack):  # type: ignore[no-untyped-def]
+    return walk_pack("bandai", both=True)
+
+
+@pytest.fixture(scope="module")
+def windows(pack):  # type: ignore[no-untyped-def]
+    return Windows([pack], ("train",), 120, torch.device("cpu"))
+
+
+def game(windows, **changes):  # type: ignore[no-untyped-def]
+    settings = StmiGanSettings(**{"config": "paper", **changes})
+    torch.manual_seed(0)
+    generator, discriminator = Generator(settings.network), Discriminator(settings.network)
+    fit_normaliser(generator, discriminator, windows, settings)
+    return Game(generator, discriminator, windows, settings, 4)
+
+
+def test_what_is_hidden():
+    rng = np.random.default_rng(0)
+    known = corrupt(rng, StmiGanSettings(config="paper"), 400)
+    assert known.shape == (400, 20, 22, 3)
+    assert known[:, 0].all()
+    ends = known[:, -1].all(axis=(1, 2))
+    assert 0.4 < (~ends).mean() < 0.6  # forecasts
+    assert not known[~ends][:, 10:].any()
+    assert known[~ends][:, :10].all()
+    others = known[ends]
+    single = (others.any(axis=-1) != others.all(axis=-1)).any(axis=(1, 2))
+    assert 0.15 < single.mean() < 0.35  # a fourth loses single coordinates
+    assert 0.25 < others[:, 1:-1].mean() < 0.75
+
+
+def test_short_beginnings_where_frames_are_dense():
+    known = corrupt(np.random.default_rng(0), StmiGanSettings(config="dense"), 200)
+    seen = known[~known[:, -1].all(axis=(1, 2))].all(axis=(2, 3)).sum(axis=1)
+    assert 20 <= seen.min() < 30
+    assert 70 < seen.max() <= 80
+
+
+def test_twenty_frames_of_four_seconds_one_of_each_block(windows):
+    settings = StmiGanSettings(config="paper", tallest=1.0)
+    motions = draw(np.random.default_rng(0), windows, settings, 3)
+    assert motions.shape == (3, 20, 22, 3)
+    small = draw(np.random.default_rng(0), windows, StmiGanSettings(config="paper"), 3)
+    ratio = (small / motions)[..., 1].flatten(1)
+    assert torch.allclose(ratio, ratio[:, :1], atol=1e-4)
+    assert ((ratio[:, 0] > 0.7) & (ratio[:, 0] < 1.3)).all()
+
+
+def test_only_what_is_visible_counts_with_a_discriminator_and_all_without(windows):
+    for branches, counts in (("base", False), ("none", True)):
+        play = game(windows, branches=branches, bones=0.0)
+        truth = draw(np.random.default_rng(0), windows, play.settings, 2)
+        observed = torch.ones_like(truth, dtype=torch.bool)
+        observed[:, 10:] = False
+        wrong = truth.clone()
+        wrong[:, 10:] += 0.1
+        right, off = (float(play.told(Motions(truth, observed, made))) for made in (truth, wrong))
+        assert right == pytest.approx(1e-4)
+        assert (off > 1.0) == counts
+
+
+def test_bones_that_are_too_long_cost_everywhere(windows):
+    play = game(windows)
+    truth = draw(np.random.default_rng(0), windows, play.settings, 2)
+    observed = torch.zeros_like(truth, dtype=torch.bool)
+    assert float(play.told(Motions(truth, observed, 1.1 * truth))) > 1.0
+    moved = truth + torch.tensor([1.0, 0.0, 0.0])
+    assert float(play.told(Motions(truth, observed, moved))) < 0.01
+
+
+def test_the_penalty_reaches_every_branch(windows):
+    """R1 needs gradients of gradients: those of the penalty alone must move all branches."""
+    play = game(windows, every=1)
+    play.opponent_loss(np.random.default_rng(0), 0.0).backward()
+    assert all(
+        p.grad is not None and p.grad.abs().sum() > 0 for p in play.discriminator.branches.parameters()
+    )
+    assert all(p.grad is None for p in play.generator.parameters())
+
+
+@pytest.mark.parametrize("changes", [{"branches": "base,sound"}, {"config": "large"}])
+def test_settings_that_are_none(changes):
+    with pytest.raises(RequestError, match=r"base, edm, motion|paper"):
+        StmiGanSettings(**changes)
+
+
+def test_a_run_learns_stops_and_goes_on(pack, tmp_path, monkeypatch):
+    """The discriminator and its optimiser are kept, too; what comes out is a graph that says the same."""
+    tiny = stmi_gan.replace(PAPER, width=32, gates=1, blocks=1, channels=(4, 6))
+    monkeypatch.setitem(stmi_gan.CONFIGS, "paper", tiny)
+    settings = StmiGanSettings(config="paper", batch=4, every_seconds=0.0)
+    told: list[str] = []
+    train_stmi_gan([pack], tmp_path, Budget.parse("6steps"), settings, say=told.append)
+    state = torch.load(tmp_path / "checkpoint.pt", weights_only=False)
+    assert state["steps"] == 6
+    assert state["opponent_optimizer"]["state"]
+    told.clear()
+    model = train_stmi_gan([pack], tmp_path, Budget.parse("9steps"), settings, say=told.append)
+    assert any("goes on at 67 %" in line for line in told)
+    log = [json.loads(line) for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert log[-1]["step"] == 9
+    assert all(np.isfinite(value) for entry in log for value in entry.values())
+
+    export_stmi_gan(tmp_path, [pack], tmp_path / "weights", ["train"])
+    card = weights.load(tmp_path / "weights", "stmi-gan")
+    rng = np.random.default_rng(2)
+    positions = draw(rng, Windows([pack], ("train",), 120, torch.device("cpu")), settings, 2).numpy()
+    observed = rng.random((2, 20, 22, 3)) < 0.7
+    observed[:, 0] = True
+    raw, completed = run(card, positions, observed)
+    still = torch.zeros(2, model.noises, 20, 32)
+    with torch.no_grad():
+        for value in model.parameters():
+            if value.numel() >= 1024:  # stored in 16 bits
+                value.copy_(value.half())
+        expected = model(torch.from_numpy(positions), torch.from_numpy(observed), still)
+    assert np.allclose(raw, expected[0], atol=1e-4)
+    assert np.allclose(completed, expected[1], atol=1e-4)
+
+    # Forecasts go on past the window; what is known stays.
+    motion, seen = positions[0].repeat(3, axis=0).astype(float), np.ones((60, 22), bool)
+    seen[25:] = False
+    _, _, longer = run_long(card, motion, seen, np.random.default_rng(0), 1.0)
+    assert np.array_equal(longer[:25], motion[:25])
+    assert np.isfinite(longer).all()
+    spoiled = np.where(seen[..., None], motion, 77.0)
+    assert np.array_equal(longer, run_long(card, spoiled, seen, np.random.default_rng(0), 1.0)[2])
+    assert StmiGan(card).at(0.5).temperature == 0.5
