@@ -356,3 +356,49 @@ def test_auto_takes_the_network_made_for_keys_where_keys_are_lone(cmu_walk):
     assert methods((1, 150)) == ["spline"], "longer than it can fill"
     assert methods((0, 30)) != ["cmib"], "nothing before it"
     assert {gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps} == {"cmib"}
+
+
+def dropped(clip, share):  # type: ignore[no-untyped-def]
+    """The clip with joints in their rest pose, each in a share of the frames, and which values are lost."""
+    lost = np.random.default_rng(0).random(clip.rotation.shape[:2]) < share
+    lost[:, 0] = False
+    lost[[0, -1]] = False
+    rotation = np.where(lost[..., None], clip.skeleton.rest_rotation, clip.rotation)
+    return clip.with_motion(rotation, clip.translation), lost
+
+
+def test_joints_lost_for_moments_are_found_and_interpolated(cmu_walk):
+    """At random frames: one line tells of them, the rest comes back bit for bit, and the error is small."""
+    noisy, _ = dropped(cmu_walk, 0.3)
+    done = tasks.recover(noisy)
+    assert done.report.gaps == []
+    assert "lost for moments" in str(done.report)
+    found = done.provenance != 0
+    assert np.array_equal(done.clip.rotation[~found], noisy.rotation[~found])
+    spoiled = rotations.angle(noisy.rotation, cmu_walk.rotation) > 0.1
+    assert found[spoiled].mean() > 0.95
+    off = 100 * np.linalg.norm(done.clip.positions() - cmu_walk.positions(), axis=-1)
+    before = 100 * np.linalg.norm(noisy.positions() - cmu_walk.positions(), axis=-1)
+    assert off.mean() < 0.3 < 10 < before.mean()
+
+
+def test_only_frames_asked_for_are_recovered(cmu_walk):
+    noisy, _ = dropped(cmu_walk, 0.1)
+    done = tasks.recover(noisy, frames=(40, 60))
+    assert not done.provenance[:40].any()
+    assert not done.provenance[60:].any()
+    assert done.provenance[40:60].any()
+
+
+def test_moments_beside_a_gap(cmu_walk):
+    """A gap is filled as ever, and what is lost for moments elsewhere has no influence on its own values."""
+    noisy, lost = dropped(cmu_walk, 0.1)
+    lost[70:120] = False
+    lost[80:110] = True
+    observation = Observation(~lost, np.ones_like(lost))
+    done = tasks.fill(noisy, observation)
+    (gap,) = done.report.gaps
+    assert (gap.start, gap.stop) == (80, 110)
+    assert len(done.report.moments) > 10
+    spoiled = noisy.with_motion(np.where(lost[..., None], [1.0, 0, 0, 0], noisy.rotation), noisy.translation)
+    assert np.array_equal(tasks.fill(spoiled, observation).clip.rotation, done.clip.rotation)

@@ -146,7 +146,7 @@ def fill(
 
 def recover(
     clip: Clip | str | Path,
-    joints: str | Sequence[str],
+    joints: str | Sequence[str] | None = None,
     frames: str | tuple[int, int] | None = None,
     *,
     method: str = "auto",
@@ -157,7 +157,8 @@ def recover(
 
     Args:
         clip: a clip, or the path of one.
-        joints: names; one name may stand alone.
+        joints: names; one name may stand alone. Without any, what was lost is found: joints that snap to
+            their rest pose and spikes, at any frames.
         frames: "120:160" or (120, 160); None for all.
         method, seed, progress: as in `fill`.
 
@@ -168,7 +169,7 @@ def recover(
     chosen = _gap(frames) if frames is not None else None
     return tasks.recover(
         _clip(clip),
-        [joints] if isinstance(joints, str) else list(joints),
+        [joints] if isinstance(joints, str) else joints if joints is None else list(joints),
         (chosen.start, chosen.stop) if chosen else None,
         method=method,
         seed=seed,

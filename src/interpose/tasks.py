@@ -16,21 +16,25 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, seams
 from interpose.finish.denoise import denoised
-from interpose.finish.guarantees import check_pins
+from interpose.finish.guarantees import check_pins, wipe
 from interpose.finish.measures import acceleration
 from interpose.finish.path import spans as path_spans
+from interpose.finish.report import JointMoments, Provenance
 from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods import auto, registry
+from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Part, timeline
+from interpose.observation.broken import broken
 from interpose.observation.part import lay
 from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
+MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
 
@@ -63,7 +67,8 @@ def fill(
         clip: F frames; its values inside the gaps have no influence.
         gaps: what is missing, or an observation that says for every value whether it is known. Gaps that
             touch or overlap count as one.
-        method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length.
+        method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length:
+            values that an observation misses for moments it interpolates one by one.
         max_gap: frames; longer gaps stay open.
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
         seed: for methods that sample.
@@ -83,6 +88,11 @@ def fill(
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     check_pins(observation)
     clip, observation = lay(clip, observation, parts)
+    brief = _momentary(clip, observation) if isinstance(gaps, Observation) else None
+    if brief and method in ("auto", "spline"):
+        mended, seen = _mended(clip, observation, brief)
+        rest = fill(mended, seen, method, max_gap, only, seed, methods, progress, action, (), path)
+        return _with_moments(rest, clip, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
             "there is nothing to go by",
@@ -123,6 +133,53 @@ def fill(
     )
 
 
+def _momentary(clip: Clip, observation: Observation) -> Observation | None:
+    """Which values are lost only for moments in frames of which something is known; None if there are none.
+
+    "True" means lost here. Shorter than what `auto` gives to a network, with known values on both sides: the
+    velocities there make interpolation continuous, so nothing needs to be eased. Measured on validation
+    performers with rotations dropped at random, p .3 and .5: joints are off by .08 and .19 cm so, and by .33
+    and .64 when each such run is eased like a gap.
+    """
+    longest = round(MOMENT * clip.fps)
+    some = np.asarray(observation.rotation.any(axis=1))
+    masks: list[np.ndarray] = []
+    for known in (observation.rotation, observation.translation):
+        lost = np.zeros(known.shape, bool)
+        for joint in np.flatnonzero(~known.all(axis=0)):
+            for start, stop in runs(np.logical_not(known[:, joint])):
+                if start > 0 and stop < len(known) and stop - start <= longest and some[start:stop].all():
+                    lost[start:stop, joint] = True
+        masks.append(lost)
+    return Observation(masks[0], masks[1]) if any(mask.any() for mask in masks) else None
+
+
+def _mended(clip: Clip, observation: Observation, lost: Observation) -> tuple[Clip, Observation]:
+    """The clip with what was lost for moments interpolated, and an observation to which that is known."""
+    said, columns = Spline().complete(wipe(clip, observation), observation).clip, list(clip.translated)
+    mended = clip.with_motion(
+        np.where(lost.rotation[..., None], said.rotation, clip.rotation),
+        np.where(lost.translation[:, columns, None], said.translation, clip.translation),
+    )
+    known = replace(
+        observation,
+        rotation=observation.rotation | lost.rotation,
+        translation=observation.translation | lost.translation,
+    )
+    return mended, known
+
+
+def _with_moments(done: Completion, clip: Clip, lost: Observation) -> Completion:
+    """A completion that also tells what had been lost for moments."""
+    either = lost.rotation | lost.translation
+    moments = tuple(
+        JointMoments(clip.skeleton.names[j], tuple(f"{a}:{b}" for a, b in runs(either[:, j])))
+        for j in np.flatnonzero(either.any(axis=0))
+    )
+    provenance = np.where(either, np.int8(Provenance.METHOD), done.provenance)
+    return replace(done, provenance=provenance, report=replace(done.report, moments=moments))
+
+
 def _handed(clip: Clip, observation: Observation) -> Clip:
     """The clip with its handedness said, from all that is observed of it: single gaps must not decide."""
     frames = np.flatnonzero(observation.frames)
@@ -136,7 +193,7 @@ def _handed(clip: Clip, observation: Observation) -> Clip:
 
 def recover(
     clip: Clip,
-    joints: Sequence[str],
+    joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
     method: str = "auto",
     seed: int | None = None,
@@ -144,9 +201,18 @@ def recover(
 ) -> Completion:
     """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
 
-    Arguments, result and errors are those of `fill`.
+    Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose, and
+    spikes, at any frames. Other arguments, result and errors are those of `fill`.
     """
     start, stop = frames or (0, len(clip))
+    if joints is None:
+        if frames is not None:
+            Gap(start, stop).check(len(clip))
+        seen = broken(clip)
+        outside = np.ones(len(clip), bool)
+        outside[start:stop] = False
+        seen.rotation[outside], seen.translation[outside] = True, True
+        return fill(clip, seen, method, seed=seed, progress=progress)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 

@@ -221,6 +221,22 @@ def test_joints_in_a_range_and_in_the_whole_clip(run, take):
     assert whole.json["gaps"][0]["frames"] == "0:163"
 
 
+def test_recover_without_joints_finds_what_was_lost_for_moments(run, take):
+    clip = load(Path("take.bvh"))
+    elbow, rotation = clip.skeleton.index("LeftForeArm"), clip.rotation.copy()
+    for frame in range(10, 80, 7):
+        rotation[frame, elbow] = clip.skeleton.rest_rotation[elbow]
+    save(clip.with_motion(rotation, clip.translation), Path("lost.bvh"))
+    done = run("recover", "lost.bvh", "--player")
+    assert done.code == 0
+    assert "lost for moments and interpolated: 1" in done.out
+    moments = json.loads(Path("lost.recovered.json").read_text())["moments"]
+    (elbow,) = (one["frames"] for one in moments if one["joint"] == "LeftForeArm")
+    assert elbow == [f"{frame}:{frame + 1}" for frame in range(10, 80, 7)]
+    off = load(Path("lost.recovered.bvh")).positions() - clip.positions()
+    assert abs(off).max() < 0.02
+
+
 def test_recover(run, take):
     done = run("recover", "take.bvh", "--joints", "LeftForeArm", "--frames", "60:80", "--method", "spline")
     assert done.code == 0

@@ -10,6 +10,7 @@ METHODS = {
     "auto": "what measured best: short gaps the spline, long ones cae, between lone keys cmib",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
+    "kalman": "low-rank Kalman smoothing: joints that move together tell where a lost limb is",
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
     "cmib": "conditional in-betweening of Kim et al. 2022: between keys, with an action if you like",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",

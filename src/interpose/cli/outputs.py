@@ -172,6 +172,7 @@ def to_json(
             }
             for number, gap in numbered(completion)
         ],
+        **({"moments": report["moments"]} if "moments" in report else {}),
         "units": UNITS,
     }
 
@@ -226,14 +227,18 @@ def compare(clip: Clip, completion: Completion, title: str) -> str:
     takes = [Take(done, completion.clip.positions(), "#d1495b")]
     if clip is not completion.clip:
         takes.append(Take("input", clip.positions(), "#6b7280", ghost=True))
-    gaps = [(gap.start, gap.stop) for gap in completion.report.gaps]
+    gaps = completion.report.gaps
     text, names_ = str(completion.report), clip.skeleton.names
     return player(takes, clip.skeleton.parents, clip.fps, gaps, title=title, report=text, names=names_)
 
 
 def print_report(completion: Completion, fps: float, why: dict[int, str]) -> None:
     """A line for each gap, then what is to be said about single ones, then what stayed open."""
-    gaps = completion.report.gaps
+    gaps, report = completion.report.gaps, completion.report
+    if report.moments or not (gaps or report.open):
+        say(report.momentary or "nothing is missing")
+        if not gaps:
+            return
     say_table(
         ("gap", "frames", "length", "joints", "method", "seam", "bones", "slide", "travel", "drift"),
         [_row(gap, fps) for gap in gaps],

@@ -17,7 +17,7 @@ def recover(
     file: Path,
     /,
     *,
-    joints: list[str],
+    joints: list[str] = [],  # noqa: B006
     frames: str | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
@@ -35,10 +35,12 @@ def recover(
     Try:
       interpose recover take.bvh --joints LeftArm,LeftForeArm,LeftHand
       interpose recover take.bvh --joints RightFoot --frames 120:160
+      interpose recover take.bvh
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        joints: the joints, separated by commas.
+        joints: the joints, separated by commas. Without any, what was lost is found: joints
+            that snap to their rest pose and spikes, at any frames.
         frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
         output: where to write the clip; the report goes beside it.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
@@ -51,8 +53,8 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.observation import Gap
 
-    chosen = split_names(joints)
-    if not chosen:
+    chosen = split_names(joints) if joints else None
+    if chosen is not None and not chosen:
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
@@ -60,7 +62,7 @@ def recover(
     clip = reading.load(file)
     gap = range_of(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
-    for name in chosen:
+    for name in chosen or ():
         clip.skeleton.index(name)
     outputs = Outputs.choose(file, output, "recovered", player)
     outputs.check(file, force)

@@ -152,26 +152,46 @@ class NoiseReport:
 
 
 @dataclass(frozen=True)
+class JointMoments:
+    """The frames START:STOP in which a joint was lost for moments, amid known ones; it was interpolated."""
+
+    joint: str
+    frames: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Report:
-    """The filled gaps of a clip in order of time, those left open, the action that was asked for, and what
-    denoising has to say."""
+    """The filled gaps of a clip in order of time, those left open, the action that was asked for, what was
+    lost for moments only, and what denoising has to say."""
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
     open: list[Gap] = field(default_factory=list)
     action: str = ""
     noise: NoiseReport | None = None
+    moments: tuple[JointMoments, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
         gaps, left = ([_plain(asdict(gap)) for gap in some] for some in (self.gaps, self.open))
-        noise = {} if self.noise is None else {"denoised": _plain(asdict(self.noise))}
-        return {"method": self.method, "action": self.action, "gaps": gaps, "open": left, **noise}
+        more = {} if self.noise is None else {"denoised": _plain(asdict(self.noise))}
+        more |= {"moments": [_plain(asdict(one)) for one in self.moments]} if self.moments else {}
+        return {"method": self.method, "action": self.action, "gaps": gaps, "open": left, **more}
+
+    @property
+    def momentary(self) -> str:
+        """What was lost for moments, in one line; "" for nothing."""
+        if not self.moments:
+            return ""
+        count, joints = sum(len(one.frames) for one in self.moments), [one.joint for one in self.moments]
+        named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
+        return f"lost for moments and interpolated: {count} time{'s' * (count != 1)}, of {named}"
 
     def __str__(self) -> str:
         if self.noise is not None:
             return str(self.noise)
-        lines = [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
+        lines = [self.momentary] if self.moments else []
+        lines += [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
         return "\n".join(lines) or "nothing is missing"
 
 

@@ -14,6 +14,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "zero-velocity": ("interpose.methods.classical", "ZeroVelocity"),
     "linear": ("interpose.methods.classical", "Linear"),
     "spline": ("interpose.methods.classical", "Spline"),
+    "kalman": ("interpose.methods.kalman", "Kalman"),
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
 }
