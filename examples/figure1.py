@@ -11,13 +11,13 @@ it.
 from __future__ import annotations
 
 import argparse
-import re
 from pathlib import Path
 
 import interpose
 from interpose.cli.outputs import compare
+from interpose.datasets import Entry, clips
 from interpose.geometry.time import resample
-from interpose.show import Take, strip
+from interpose.show import Take, sheet, strip
 
 SECOND, GAP = 30, 60  # frames
 ROW = 3  # gaps in a row of the picture
@@ -30,31 +30,41 @@ def main() -> None:
     parser.add_argument("--clip", type=Path, help="where to write the motion, too: figure1.bvh")
     parser.add_argument("--method", default="auto")
     given = parser.parse_args()
-    seeds = [seed(path) for pair in zip(*(trials(given.data, who) for who in ("16", "49"))) for path in pair]
-    done = interpose.stitch(seeds, GAP, method=given.method)
-    share = sum(gap.stop - gap.start for gap in done.report.gaps) / len(done.clip)
-    print(f"{done.report}\n{len(done.clip)} frames, {100 * share:.0f} % of them filled")
+    done = interpose.stitch(seeds(given.data), GAP, method=given.method)
+    print(told(done))
     path = given.out / "figure1.svg"
     path.write_text(picture(done.clip, done.report.gaps), encoding="utf-8")
     print(f"wrote {path}")
     if given.clip:
-        page = given.clip.with_suffix(".html")
-        interpose.save(done.clip, given.clip, force=True)
-        page.write_text(compare(done.clip, done, given.clip.name), encoding="utf-8")
-        print(f"wrote {given.clip}, {page}")
+        write(done, given.clip)
 
 
-def trials(data: Path, performer: str) -> list[Path]:
-    """The first eight trials of a performer."""
-    return sorted((data / "cmu" / "bvh" / performer).glob("*.bvh"))[:8]
+def seeds(data: Path) -> list[interpose.Clip]:
+    """The seeds in order, each of a second."""
+    test = clips("cmu", data, "test")
+    eight = ([one for one in test if one.performer == who][:8] for who in ("16", "49"))
+    return [seed(entry) for pair in zip(*eight) for entry in pair]
 
 
-def seed(path: Path) -> interpose.Clip:
-    """A second of a trial; its file begins with a rest pose."""
-    clip = interpose.load(path)
-    clip = resample(clip.slice(1, len(clip)), SECOND)
+def seed(entry: Entry) -> interpose.Clip:
+    """A second of a trial."""
+    clip = resample(entry.load(), SECOND)
     start = min(len(clip) // 3, len(clip) - SECOND)
     return clip.slice(start, start + SECOND)
+
+
+def told(done: interpose.Completion) -> str:
+    """What the report says of each gap, how long the motion is, and how much of it was filled."""
+    share = sum(gap.stop - gap.start for gap in done.report.gaps) / len(done.clip)
+    return f"{done.report}\n{len(done.clip)} frames, {100 * share:.0f} % of them filled"
+
+
+def write(done: interpose.Completion, path: Path) -> None:
+    """The motion as a file, and a page that plays it."""
+    page = path.with_suffix(".html")
+    interpose.save(done.clip, path, force=True)
+    page.write_text(compare(done.clip, done, path.name), encoding="utf-8")
+    print(f"wrote {path}, {page}")
 
 
 def picture(clip: interpose.Clip, gaps: list[interpose.Gap]) -> str:
@@ -74,13 +84,7 @@ def picture(clip: interpose.Clip, gaps: list[interpose.Gap]) -> str:
                 span=(some[0].start - SECOND, some[-1].stop + SECOND),
             )
         )
-    sizes = [re.search(r'width="(\d+)" height="(\d+)"', text) for text in strips]
-    heights = [int(size[2]) for size in sizes if size]
-    tops = [sum(heights[:i]) for i in range(len(strips))]
-    inner = [text.replace("<svg ", f'<svg y="{top}" ', 1) for text, top in zip(strips, tops)]
-    width, height = sizes[0][1] if sizes[0] else "", sum(heights)
-    size = f'viewBox="0 0 {width} {height}" width="{width}" height="{height}"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>\n{"".join(inner)}</svg>\n'
+    return sheet(strips)
 
 
 if __name__ == "__main__":

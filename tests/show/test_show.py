@@ -17,6 +17,7 @@ from interpose.errors import RequestError
 from interpose.observation import Gap
 from interpose.show import Take, figure, line_plot, player, strip
 from interpose.show.player import decode
+from interpose.show.plot import Box, box_plot
 from interpose.show.strip import choose_frames, excerpt, slots, view
 
 JOINTS = {
@@ -282,6 +283,11 @@ def test_hostile_text_stays_text():
         line_plot({HOSTILE: ([0, 1], [0, 1])}, HOSTILE, HOSTILE, HOSTILE, marks={HOSTILE: 0.5})
     )
     assert [t.text for t in plot.iter(SVG + "text")].count(kept) == 5
+    boxes = ET.fromstring(
+        box_plot({HOSTILE: [Box.of([1])]}, [HOSTILE], HOSTILE, HOSTILE, dots=(HOSTILE, [1]))
+    )
+    assert [t.text for t in boxes.iter(SVG + "text")].count(kept) == 4
+    assert not list(boxes.iter(SVG + "script"))
 
 
 @pytest.mark.parametrize(
@@ -366,6 +372,49 @@ def test_line_plot_interrupts_at_nan_thins_long_lines_and_takes_one_point(tmp_pa
     for series in ({}, {"a": ([], [])}, {"a": ([0, 1], [np.nan, np.inf])}, {"a": ([0, 1], [0])}):
         with pytest.raises(RequestError):
             line_plot(series, "x", "y", "t")
+
+
+def test_a_box_is_quartiles_and_whiskers_without_outliers():
+    box = Box.of([0, 1, 2, 3, 4, 5, 6, 7, 8, 30, np.nan])
+    assert (box.lower, box.median, box.upper) == (2.25, 4.5, 6.75)
+    assert (box.low, box.high) == (0, 8)
+    assert Box.of([5.0]) == Box(5, 5, 5, 5, 5)
+    with pytest.raises(RequestError, match="no finite value"):
+        Box.of([np.inf])
+
+
+def test_box_plot_places_values_right(tmp_path):
+    series = {"a": [Box(0, 1, 2, 3, 4), Box(8, 8, 8, 8, 8)], "b": [Box(2, 2, 2, 2, 2)] * 2}
+    text = box_plot(series, ["g\nh", "k"], "y", "t", tmp_path / "a.svg", dots=("truth", [2, 8]))
+    assert (tmp_path / "a.svg").read_text(encoding="utf-8") == text
+    svg = ET.fromstring(text)
+    groups = {g.get("class") + g.find(SVG + "title").text: g for g in svg.iter(SVG + "g") if g.get("class")}
+    assert list(groups) == ["seriesa", "seriesb", "dotstruth"]
+    whiskers, median = (path.get("d") for path in groups["seriesa"].findall(SVG + "path")[:2])
+    low, lower, upper, high = (
+        float(y) for y in re.findall(r"^M\S+ (\S+)V(\S+)M\S+ (\S+)V([\d.]+)", whiskers)[0]
+    )
+    unit = (low - high) / 4
+    assert unit > 0
+    assert lower == pytest.approx(low - unit, abs=0.11)
+    assert upper == pytest.approx(low - 3 * unit, abs=0.11)
+    assert float(re.findall(r" ([\d.]+)h", median)[0]) == pytest.approx(low - 2 * unit, abs=0.11)
+    heights = [float(dot.get("cy")) for dot in groups["dotstruth"].findall(SVG + "circle")]
+    assert heights == pytest.approx([low - 2 * unit, low - 8 * unit], abs=0.21)
+    left, right = (float(rect.get("x")) for rect in groups["seriesa"].findall(SVG + "rect"))
+    beside = float(groups["seriesb"].find(SVG + "rect").get("x"))
+    assert left < beside < right
+    assert {"g", "h", "k", "truth"} <= {t.text for t in svg.iter(SVG + "text")}
+
+
+def test_boxes_that_do_not_fit_their_groups_are_refused():
+    one = Box.of([1])
+    with pytest.raises(RequestError, match="1 values in 2 groups"):
+        box_plot({"a": [one]}, ["g", "h"], "y", "t")
+    with pytest.raises(RequestError, match="'truth'"):
+        box_plot({"a": [one]}, ["g"], "y", "t", dots=("truth", []))
+    with pytest.raises(RequestError, match="nothing to draw"):
+        box_plot({}, ["g"], "y", "t")
 
 
 # ---- in a browser, where there is one

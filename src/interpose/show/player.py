@@ -61,6 +61,7 @@ def player(
     report: str = "",
     names: Sequence[str] | None = None,
     span: tuple[int, int] | None = None,
+    bare: bool = False,
 ) -> str:
     """An HTML page that plays takes over each other; it needs no network and no other file.
 
@@ -76,6 +77,7 @@ def player(
         names: joint names, for the sides, the head and the feet.
         span: the frames to show, half-open. Without it all of them, or in clips too long for a page
             (more than LARGEST joint positions) as many as it can carry, from before the first gap on.
+        bare: without title and panel, to stand inside another page.
 
     Returns:
         The HTML text. `window.interposePlayer` in it tells its state and takes seek(frame), play() and
@@ -134,10 +136,10 @@ def player(
     packed = json.dumps(data, separators=(",", ":"), allow_nan=False)
     for character in "<>&":
         packed = packed.replace(character, f"\\u{ord(character):04x}")
-    parts = {"title": figure.text(title), "data": packed}
+    parts = {"title": figure.text(title), "data": packed, "kind": "bare" if bare else "whole"}
     template = resources.files("interpose.show").joinpath("player.html").read_text(encoding="utf-8")
     # One pass, so that a title that looks like a place to fill stays a title.
-    page = re.sub(r"\{\{(title|data)\}\}", lambda place: parts[place[1]], template)
+    page = re.sub(r"\{\{(title|data|kind)\}\}", lambda place: parts[place[1]], template)
     if path is not None:
         Path(path).write_text(page, encoding="utf-8")
     return page

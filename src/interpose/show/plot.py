@@ -1,9 +1,10 @@
-"""A small line chart as SVG, for curves of error and loss."""
+"""Small charts as SVG: lines, for curves of error and loss, and box plots."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from interpose.show import figure
 WIDTH, HEIGHT, LEFT, RIGHT, BOTTOM = 760, 460, 78, 26, 64
 INK, FAINT, PAPER, GRID = "#1f2328", "#656d76", "#ffffff", "#e4e8ed"
 COLORS = ("#2563c9", "#d9622b", "#2f8f4e", "#8b4fc6", "#b8860b", "#0f8b8d", "#c2345d", "#64748b")
+DOT = "#6b7280"
 
 # More points than this in a line are not seen; neighbours are averaged.
 POINTS = 800
@@ -54,6 +56,61 @@ def _thin(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _width(words: str) -> float:
     return 7.1 * len(words)
+
+
+def _legend(colors: Mapping[str, str]) -> tuple[list[str], int]:
+    """A stroke and the name of each series, and by how much they lower the plot: the legend wraps."""
+    svg = []
+    at, rank = float(LEFT), 0
+    for name, color in colors.items():
+        needs = 30 + _width(name) + 18
+        if at > LEFT and at + needs > WIDTH - RIGHT + 18:
+            at, rank = float(LEFT), rank + 1
+        y = 56.0 + 20 * rank
+        svg.append(
+            f'<line x1="{at:.1f}" y1="{y}" x2="{at + 22:.1f}" y2="{y}" stroke="{color}" stroke-width="3" '
+            f'stroke-linecap="round"/><text x="{at + 30:.1f}" y="{y + 4.5}" fill="{INK}">'
+            f"{figure.text(name)}</text>"
+        )
+        at += needs
+    return svg, 20 * rank
+
+
+def _sheet(title: str, height: int) -> list[str]:
+    """The paper and the title."""
+    return [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
+        f'height="{height}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">',
+        f"<title>{figure.text(title)}</title>",
+        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1}" rx="10" fill="{PAPER}" '
+        'stroke="#d5dae1"/>',
+        f'<text x="{LEFT}" y="32" font-size="17" font-weight="600" fill="{INK}">{figure.text(title)}</text>',
+    ]
+
+
+def _y_grid(marks: Sequence[float], py: Callable[[float], float]) -> list[str]:
+    """A line across the plot for each round value, and the value beside it."""
+    return [
+        f'<line x1="{LEFT}" y1="{py(value):.1f}" x2="{WIDTH - RIGHT}" y2="{py(value):.1f}" stroke="{GRID}"/>'
+        f'<text x="{LEFT - 10}" y="{py(value) + 4.5:.1f}" text-anchor="end" fill="{FAINT}">'
+        f"{_label(value)}</text>"
+        for value in marks
+    ]
+
+
+def _y_words(ylabel: str, middle: float) -> str:
+    return (
+        f'<text transform="translate(22 {middle:.1f}) rotate(-90)" text-anchor="middle" fill="{INK}">'
+        f"{figure.text(ylabel)}</text>"
+    )
+
+
+def _done(svg: list[str], path: str | Path | None) -> str:
+    """The text of the picture, written to a file as well if there is one."""
+    result = "\n".join([*svg, "</svg>\n"])
+    if path is not None:
+        Path(path).write_text(result, encoding="utf-8")
+    return result
 
 
 def line_plot(
@@ -110,17 +167,9 @@ def line_plot(
         y_high += room
         y_marks = ticks(y_low, y_high)
 
-    # The legend wraps; the plot starts below it.
-    legend: list[tuple[str, str, float, int]] = []
-    at, rank = float(LEFT), 0
-    for i, name in enumerate(lines):
-        needs = 30 + _width(name) + 18
-        if at > LEFT and at + needs > WIDTH - RIGHT + 18:
-            at, rank = float(LEFT), rank + 1
-        legend.append((name, COLORS[i % len(COLORS)], at, rank))
-        at += needs
-    top = 78 + 20 * rank
-    height = HEIGHT + 20 * rank
+    colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate(lines)}
+    legend, lower = _legend(colors)
+    top, height = 78 + lower, HEIGHT + lower
 
     def px(value: float) -> float:
         return LEFT + (value - x_low) / (x_high - x_low) * (WIDTH - LEFT - RIGHT)
@@ -129,28 +178,7 @@ def line_plot(
         low, high, at = (math.log10(v) if log else v for v in (y_low, y_high, value))
         return height - BOTTOM - (at - low) / (high - low) * (height - BOTTOM - top)
 
-    svg = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
-        f'height="{height}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">',
-        f"<title>{figure.text(title)}</title>",
-        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1}" rx="10" fill="{PAPER}" '
-        'stroke="#d5dae1"/>',
-        f'<text x="{LEFT}" y="32" font-size="17" font-weight="600" fill="{INK}">{figure.text(title)}</text>',
-    ]
-    for name, color, x0, line in legend:
-        y0 = 56.0 + 20 * line
-        svg.append(
-            f'<line x1="{x0:.1f}" y1="{y0}" x2="{x0 + 22:.1f}" y2="{y0}" stroke="{color}" stroke-width="3" '
-            f'stroke-linecap="round"/><text x="{x0 + 30:.1f}" y="{y0 + 4.5}" fill="{INK}">'
-            f"{figure.text(name)}</text>"
-        )
-    for value in y_marks:
-        y0 = py(value)
-        svg.append(
-            f'<line x1="{LEFT}" y1="{y0:.1f}" x2="{WIDTH - RIGHT}" y2="{y0:.1f}" stroke="{GRID}"/>'
-            f'<text x="{LEFT - 10}" y="{y0 + 4.5:.1f}" text-anchor="end" fill="{FAINT}">'
-            f"{_label(value)}</text>"
-        )
+    svg = [*_sheet(title, height), *legend, *_y_grid(y_marks, py)]
     base = height - BOTTOM
     for value in ticks(x_low, x_high, 8):
         x0 = px(value)
@@ -169,7 +197,7 @@ def line_plot(
             f'text-anchor="{"end" if left else "start"}" fill="{FAINT}" stroke="{PAPER}" stroke-width="4" '
             f'paint-order="stroke">{figure.text(words)}</text>'
         )
-    for (name, color, *_), (x, y) in zip(legend, lines.values()):
+    for (name, color), (x, y) in zip(colors.items(), lines.values()):
         shape, pen_down, dots = "", False, ""
         for a, b in zip(x, y):
             if np.isnan(b):
@@ -185,15 +213,115 @@ def line_plot(
             f'd="{shape}"/>'
             f"{dots}</g>"
         )
-    middle = (top + base) / 2
     svg.append(
         f'<text x="{(LEFT + WIDTH - RIGHT) / 2}" y="{height - 18}" text-anchor="middle" fill="{INK}">'
-        f"{figure.text(xlabel)}</text>"
-        f'<text transform="translate(22 {middle:.1f}) rotate(-90)" text-anchor="middle" fill="{INK}">'
-        f"{figure.text(ylabel)}</text>"
+        f"{figure.text(xlabel)}</text>" + _y_words(ylabel, (top + base) / 2)
     )
-    svg.append("</svg>\n")
-    result = "\n".join(svg)
-    if path is not None:
-        Path(path).write_text(result, encoding="utf-8")
-    return result
+    return _done(svg, path)
+
+
+@dataclass(frozen=True)
+class Box:
+    """What a box plot shows of some values: quartiles, and whiskers to the last value within 1.5 times their
+    distance (Tukey 1977)."""
+
+    low: float
+    lower: float
+    median: float
+    upper: float
+    high: float
+
+    @classmethod
+    def of(cls, values: Sequence[float] | np.ndarray) -> Box:
+        """Of some values; those that are not finite are left out. RequestError if no other is there."""
+        finite = np.asarray(values, float)
+        finite = finite[np.isfinite(finite)]
+        if not finite.size:
+            raise RequestError("there is nothing to draw", "a box has no finite value")
+        lower, median, upper = (float(value) for value in np.percentile(finite, [25, 50, 75]))
+        reach = 1.5 * (upper - lower)
+        inside = finite[(finite >= lower - reach) & (finite <= upper + reach)]
+        return cls(float(inside.min()), lower, median, upper, float(inside.max()))
+
+
+def box_plot(
+    series: Mapping[str, Sequence[Box]],
+    groups: Sequence[str],
+    ylabel: str,
+    title: str,
+    path: str | Path | None = None,
+    *,
+    dots: tuple[str, Sequence[float]] | None = None,
+) -> str:
+    """Boxes side by side in groups, as SVG; values beyond the whiskers are not drawn.
+
+    Args:
+        series: name to its box in each group.
+        groups: words below the axis; a line break starts a second line.
+        ylabel, title: words at the axis and above.
+        path: where to write the picture, too (UTF-8).
+        dots: a name, and a value in each group that a grey dot shows (the truth).
+
+    Returns:
+        The SVG text.
+
+    Raises:
+        RequestError: nothing to draw, or not one box, or one dot, for each group.
+    """
+    marked = dict([dots] if dots else [])
+    for name, values in {**series, **marked}.items():
+        if len(values) != len(groups):
+            raise RequestError(
+                f"cannot draw {name!r}", f"it has {len(values)} values in {len(groups)} groups"
+            )
+    if not series or not groups:
+        raise RequestError("there is nothing to draw", "no group has a box")
+    ends = [end for boxes in series.values() for box in boxes for end in (box.low, box.high)]
+    ends += [value for values in marked.values() for value in values]
+    room = 0.06 * (max(ends) - min(ends)) or 1.0
+    y_low, y_high = min(ends) - room, max(ends) + room
+
+    colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate(series)}
+    legend, lower = _legend({**colors, **dict.fromkeys(marked, DOT)})
+    top, height = 78 + lower, HEIGHT + lower
+    base = height - BOTTOM
+    column = (WIDTH - LEFT - RIGHT) / len(groups)
+    step = min(0.8 * column / len(series), 44.0)  # from one box of a group to the next
+
+    def py(value: float) -> float:
+        return base - (value - y_low) / (y_high - y_low) * (base - top)
+
+    svg = [*_sheet(title, height), *legend, *_y_grid(ticks(y_low, y_high), py)]
+    for at, group in enumerate(groups):
+        middle = LEFT + (at + 0.5) * column
+        for line, words in enumerate(group.splitlines()):
+            svg.append(
+                f'<text x="{middle:.1f}" y="{base + 21 + 17 * line}" text-anchor="middle" '
+                f'fill="{FAINT if line else INK}">{figure.text(words)}</text>'
+            )
+    for i, (name, color) in enumerate(colors.items()):
+        shapes = ""
+        for at, box in enumerate(series[name]):
+            x, half = LEFT + (at + 0.5) * column + (i - (len(series) - 1) / 2) * step, 0.36 * step
+            low, bottom, median, upper, high = (py(v) for v in vars(box).values())
+            shapes += (
+                f'<path fill="none" d="M{x:.1f} {low:.1f}V{bottom:.1f}M{x:.1f} {upper:.1f}V{high:.1f}'
+                f'M{x - half / 2:.1f} {low:.1f}h{half:.1f}M{x - half / 2:.1f} {high:.1f}h{half:.1f}"/>'
+                f'<rect x="{x - half:.1f}" y="{upper:.1f}" width="{2 * half:.1f}" '
+                f'height="{bottom - upper:.1f}" fill-opacity=".22"/>'
+                f'<path stroke-width="2.6" d="M{x - half:.1f} {median:.1f}h{2 * half:.1f}"/>'
+            )
+        svg.append(
+            f'<g class="series" fill="{color}" stroke="{color}" stroke-width="1.6">'
+            f"<title>{figure.text(name)}</title>{shapes}</g>"
+        )
+    for name, values in marked.items():
+        circles = "".join(
+            f'<circle cx="{LEFT + (at + 0.5) * column:.1f}" cy="{py(value):.1f}" r="4"/>'
+            for at, value in enumerate(values)
+        )
+        svg.append(
+            f'<g class="dots" fill="{DOT}" stroke="{PAPER}"><title>{figure.text(name)}</title>{circles}</g>'
+        )
+    svg.append(_y_words(ylabel, (top + base) / 2))
+    return _done(svg, path)
