@@ -16,7 +16,12 @@ from interpose.methods import weights
 def folders(tmp_path):  # type: ignore[no-untyped-def]
     """The installed weights twice, as if they had been trained for rows of their own."""
     card = weights.find("cae")
-    for name, how in (("ours60", {"gap": 30}), ("again", {"gap": 30}), ("l2", {"loss": "l2", "bones": 1.0})):
+    trained = {
+        "ours60": {"gap": 30},
+        "again": {"gap": 30, "noise": 0.0},
+        "l2": {"loss": "l2", "bones": 1.0, "noise": 0.3},
+    }
+    for name, how in trained.items():
         folder = tmp_path / name
         folder.mkdir()
         shutil.copy(card.onnx, folder)
@@ -35,8 +40,8 @@ def test_networks_to_compare_with_are_rows_measured_like_the_installed_one(publi
     result = infilling.run(published, most=1, trained=cards)
     one, other, third = result.networks
     assert one == "cae (gaps of 1 s), true trajectory"
-    assert other == f"{one}, {folders / 'again'}"
-    assert third == "cae (curriculum, L2, bones 1), true trajectory"
+    assert other == f"cae (gaps of 1 s), {folders / 'again'}, true trajectory"
+    assert third == "cae (curriculum, L2, bones 1, also on noise), true trajectory"
     for frames in infilling.GAPS:
         known = result.mean("all", "cae, true trajectory", frames)
         assert known is not None
@@ -45,6 +50,7 @@ def test_networks_to_compare_with_are_rows_measured_like_the_installed_one(publi
     assert f"| {third} |" in result.table()
     assert f"{folders / 'l2'}." in str(result)
     assert result.to_dict()["networks"][third]["parameters"] == 4_703_425
+    assert result.to_dict()["networks"][third]["splits"] == cards[2].training["splits"]
 
 
 def test_a_folder_without_weights_is_one_error(tmp_path):

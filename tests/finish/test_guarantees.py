@@ -292,13 +292,14 @@ def beside(clip: Clip, speaking, before: int, after: int, length: int = 40) -> s
     part = clip.slice(0, before + length + after)
     done = complete(part, gaps_of(part, (before, before + length)), speaking(part, sigma=0.0))
     [report] = done.report.gaps
-    return " ".join(note for note in report.notes if "known before it" in note)
+    return " ".join(note for note in report.notes if "on either side" in note)
 
 
 @pytest.mark.parametrize(("before", "after"), [(2, 40), (40, 2), (7, 8), (5, 3)])
 def test_little_beside_a_gap_is_told(walk, speaking, before, after):
     said = beside(walk, speaking, before, after)
-    assert f"{before} frames are known before it and {after} after it" in said
+    few = [f"{n} frames {side} it" for n, side in ((before, "before"), (after, "after")) if n < 8]
+    assert f"only {' and '.join(few)} are known" in said
     assert "a gap of 40 needs 8 on either side" in said
 
 
@@ -307,9 +308,10 @@ def test_enough_beside_a_gap_keys_and_open_ends_are_not_told(walk, speaking):
         assert beside(walk, speaking, before, after) == ""
     assert "a gap of 60 needs 10" in beside(walk, speaking, 9, 40, length=60), "a sixth of it"
     assert beside(walk, speaking, 10, 40, length=60) == ""
+    assert beside(walk, speaking, 2, 40, length=8) == "", "too short to matter"
     known = gaps_of(walk, (20, 60), (62, 100))
     [report, _] = complete(walk, known, Spline()).report.gaps
-    assert not any("known before it" in note for note in report.notes), "two frames are enough for a spline"
+    assert not any("on either side" in note for note in report.notes), "two frames are enough for a spline"
 
 
 def test_other_gaps_end_what_is_known_and_lost_joints_do_not(walk, speaking):
@@ -319,11 +321,11 @@ def test_other_gaps_end_what_is_known_and_lost_joints_do_not(walk, speaking):
         (gap.start, gap.joints): note
         for gap in complete(walk, known, speaking(walk, sigma=0.0)).report.gaps
         for note in gap.notes
-        if "known before it" in note
+        if "on either side" in note
     }
     assert set(told) == {(20, None), (62, None)}
-    assert "20 frames are known before it and 2 after it" in told[20, None]
-    assert "2 frames are known before it and 20 after it, and a gap of 38" in told[62, None]
+    assert "only 2 frames after it are known, and a gap of 40 " in told[20, None]
+    assert "only 2 frames before it are known, and a gap of 38 " in told[62, None]
 
 
 def test_short_seeds_of_a_stitched_clip_are_told(walk):
@@ -331,5 +333,5 @@ def test_short_seeds_of_a_stitched_clip_are_told(walk):
 
     short, long = walk.slice(0, 5), walk.slice(40, 80)
     first, second = tasks.stitch([long, short, long], 30).report.gaps
-    assert "40 frames are known before it and 5 after it" in " ".join(first.notes)
-    assert "5 frames are known before it and 40 after it" in " ".join(second.notes)
+    assert "only 5 frames after it are known" in " ".join(first.notes)
+    assert "only 5 frames before it are known" in " ".join(second.notes)

@@ -15,6 +15,9 @@ MASKS = {
     "joints per frame": lambda rng: corruption.joints_per_frame_mask(rng, 50, 40, 22, 0.3),
     "limb": lambda rng: corruption.limb_mask(rng, 50, 40),
     "frames": lambda rng: corruption.frames_mask(rng, 50, 40, 22, 0.3),
+    "occluded joints": lambda rng: corruption.occluded_joints_mask(rng, 50, 40, 22, 0.8),
+    "occluded chains": lambda rng: corruption.occluded_chains_mask(rng, 50, 40, 22, 0.8, per_frame=True),
+    "missing frames": lambda rng: corruption.missing_frames_mask(rng, 50, 40, 22, 0.8),
 }
 
 
@@ -29,7 +32,7 @@ def test_masks_are_seeded_and_miss_something(name):
     assert not (mask == mask[:1]).all()
 
 
-@pytest.mark.parametrize("name", ["gap", "gaps", "frames"])
+@pytest.mark.parametrize("name", ["gap", "gaps", "frames", "missing frames"])
 def test_whole_poses_go_and_the_ends_stay(name):
     mask = MASKS[name](np.random.default_rng(1))
     assert (mask == mask[:, :, :1]).all()
@@ -94,3 +97,59 @@ def test_noise(precision):
     assert noisy.dtype == positions.dtype
     assert abs((noisy - positions).std() - 0.0625) < 1e-3
     assert abs((noisy - positions).mean()) < 1e-3
+
+
+@pytest.mark.parametrize("per_frame", [False, True])
+def test_an_exact_share_of_the_joints_is_occluded(per_frame):
+    mask = corruption.occluded_joints_mask(np.random.default_rng(0), 30, 40, 22, 0.8, per_frame)
+    assert mask[:, [0, -1]].all()
+    assert ((~mask[:, 1:-1]).sum(axis=2) == 18).all()
+    same = (mask[:, 1:-1] == mask[:, 1:2]).all(axis=(1, 2))
+    assert same.all() != per_frame
+    assert (~mask[:, 1]).any(axis=0).all(), "any joint can go, the root too"
+
+
+def test_draws_with_replacement_hide_as_much_as_the_public_code():
+    """Of n joints or frames .8 n draws leave (1 - 1 / n) to that power."""
+    rng = np.random.default_rng(0)
+    joints = corruption.occluded_joints_mask(rng, 3000, 3, 22, 0.8, repeats=True)
+    assert abs(joints[:, 1].mean() - (1 - 1 / 22) ** 17) < 0.01
+    frames = corruption.missing_frames_mask(rng, 500, 120, 2, 0.8, repeats=True)
+    assert frames[:, [0, -1]].all()
+    assert abs(frames[:, 1:-1].mean() - (1 - 1 / 118) ** 94) < 0.01
+
+
+def test_an_exact_share_of_the_frames_is_missing():
+    mask = corruption.missing_frames_mask(np.random.default_rng(0), 50, 120, 22, 0.8)
+    assert ((~mask[:, :, 0]).sum(axis=1) == 94).all()
+
+
+@pytest.mark.parametrize("per_frame", [False, True])
+def test_whole_chains_are_occluded_until_it_is_enough(per_frame):
+    mask = corruption.occluded_chains_mask(np.random.default_rng(0), 50, 40, 22, 0.8, per_frame)
+    assert mask[:, [0, -1]].all()
+    missing = ~mask[:, 1:-1].reshape(-1, 22)
+    assert (missing.sum(axis=1) >= 0.8 * 22).all()
+    whole = np.stack([missing[:, list(chain)].all(axis=1) for chain in corruption.CHAINS], axis=1)
+    for gone, chains in zip(missing, whole):
+        covered = {joint for chain, there in zip(corruption.CHAINS, chains) if there for joint in chain}
+        assert set(np.flatnonzero(gone)) == covered
+    assert (mask[:, 1:-1] == mask[:, 1:2]).all() != per_frame
+    few = corruption.occluded_chains_mask(np.random.default_rng(0), 50, 4, 22, 0.1)
+    assert ((~few[:, 1]).sum(axis=1) <= 5).all(), "one chain is enough"
+
+
+def test_chains_make_up_the_body():
+    assert {joint for chain in corruption.CHAINS for joint in chain} == set(range(22))
+
+
+def test_single_coordinates_are_lost_in_transmission():
+    mask = corruption.noisy_transmission_mask(np.random.default_rng(0), 4, 40, 22, 0.8)
+    assert mask.shape == (4, 40, 22, 3)
+    assert mask[:, [0, -1]].all()
+    assert ((~mask).sum(axis=(1, 2, 3)) == round(0.8 * 38 * 66)).all()
+    assert (mask.any(axis=-1) != mask.all(axis=-1)).any(), "a joint can lose a part"
+    joints = corruption.noisy_transmission_mask(np.random.default_rng(0), 4, 40, 22, 0.8, by_joint=True)
+    assert joints[:, [0, -1]].all()
+    assert (joints == joints[..., :1]).all()
+    assert abs(joints[:, 1:-1].mean() - 0.2) < 0.02

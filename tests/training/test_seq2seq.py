@@ -1,4 +1,4 @@
-"""The recipe of the sequence-to-sequence network: a short run that learns, stops and goes on, and its graph."""
+"""The sequence-to-sequence recipe: a short run that learns, stops and goes on, and its graph."""
 
 from __future__ import annotations
 

@@ -16,6 +16,7 @@ from interpose.errors import FileError, RequestError  # noqa: E402
 from interpose.methods import weights  # noqa: E402
 from interpose.methods.cae import run  # noqa: E402
 from interpose.models.cae import Infiller, to_image  # noqa: E402
+from interpose.training import cae  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cae import (  # noqa: E402
     NETWORKS,
@@ -23,7 +24,9 @@ from interpose.training.cae import (  # noqa: E402
     bone_error,
     corrupt,
     curriculum_mean,
+    disturb,
     fit_normaliser,
+    predict_disturbed,
     train_cae,
 )
 from interpose.training.export import export_cae  # noqa: E402
@@ -158,6 +161,86 @@ def test_bones_of_the_right_length_cost_nothing(pack):
     larger = (2 * (truth * model.std + model.mean) - model.mean) / model.std
     length = np.linalg.norm(pack.body[0, 1:], axis=-1).mean()
     assert float(bone_error(model, larger, truth) * model.std[3:66].mean()) == pytest.approx(length, rel=1e-3)
+
+
+def test_a_share_of_clips_is_noisy_or_loses_joints():
+    settings = CaeSettings(length=60, noise=0.3)
+    chosen, noise, kept = disturb(np.random.default_rng(0), settings, 1000)
+    sigma, lost = noise.std(axis=(1, 2, 3)), (~kept[:, :, 1:]).mean(axis=(1, 2))
+    noisy, gone = sigma > 0, lost > 0
+    assert chosen.mean() == pytest.approx(0.3, abs=0.05)
+    assert np.array_equal(noisy | gone, chosen)
+    assert not (noisy & gone).any()
+    assert noisy.sum() == pytest.approx(gone.sum(), rel=0.3)
+    assert sigma.max() == pytest.approx(1.5 * 0.0625, rel=0.05)
+    assert sigma[noisy].mean() == pytest.approx(0.75 * 0.0625, rel=0.1)
+    assert lost.max() == pytest.approx(0.5, abs=0.05)
+    assert lost[gone].mean() == pytest.approx(0.25, abs=0.03)
+    assert kept[:, :, 0].all()
+
+
+def test_a_disturbed_image_has_noisy_positions_and_a_clean_trajectory(pack):
+    windows, rng = Windows([pack], ["train"], 60, torch.device("cpu")), np.random.default_rng(0)
+    model = Infiller()
+    fit_normaliser(model, windows, rng)
+    positions = windows.draw(rng, 2)
+    image = to_image(positions, torch.ones_like(positions[..., 0], dtype=torch.bool))
+    noise = torch.from_numpy(rng.normal(0, 0.1, positions.shape)).float()
+    kept = torch.from_numpy(rng.random(positions.shape[:-1]) > 0.4)
+    whole, silent = torch.ones_like(kept), torch.zeros_like(noise)
+    with torch.no_grad():
+        assert torch.equal(predict_disturbed(model, image, silent, whole), model.predict(image))
+        shifted = to_image(positions, whole)
+        shifted.rows[:, :66] += noise.flatten(2).transpose(1, 2)
+        assert torch.allclose(
+            predict_disturbed(model, image, noise, whole), model.predict(shifted), atol=1e-5
+        )
+        # Nothing is seen of a lost joint: neither where it is, nor its noise.
+        lost = predict_disturbed(model, image, silent, kept)
+        assert torch.equal(predict_disturbed(model, image, noise * ~kept[..., None], kept), lost)
+        assert not torch.allclose(lost, model.predict(image), atol=1e-3)
+
+
+class Echo(torch.nn.Module):
+    """A network that believes what it is shown."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.scale = torch.nn.Parameter(torch.ones(1))
+
+    def forward(self, image):  # type: ignore[no-untyped-def]
+        return image * self.scale
+
+
+def test_training_on_noise_asks_for_the_clean_clip(pack, tmp_path, monkeypatch):
+    """An echo is wrong by the noise, and by it alone: no gap is left, and the answer is the clean clip."""
+
+    def worst(rng, settings, batch):  # type: ignore[no-untyped-def]
+        shape = (batch, settings.length, 22)
+        return np.ones(batch, bool), np.full((*shape, 3), 0.1, np.float32), np.ones(shape, bool)
+
+    monkeypatch.setitem(NETWORKS, "echo", lambda: Infiller(Echo()))
+    monkeypatch.setattr(cae, "disturb", worst)
+    settings = CaeSettings(
+        length=60, batch=4, gap=30, network="echo", noise=0.5, learning_rate=1e-9, every_seconds=0.0
+    )
+    model = train_cae([pack], tmp_path, Budget.parse("1steps"), settings, say=lambda line: None)
+    log = json.loads((tmp_path / "log.jsonl").read_text())
+    assert log["loss"] == pytest.approx(float((0.1 / model.std[:66]).sum()) / 69, rel=0.02)
+
+
+def test_the_plain_recipe_draws_no_noise(pack, tmp_path, monkeypatch):
+    """Its batches are those that it always drew."""
+    monkeypatch.setattr(cae, "disturb", lambda *given: pytest.fail("noise was drawn"))
+    drawn = []
+    monkeypatch.setattr(cae, "to_image", lambda *given: drawn.append(given) or to_image(*given))
+    settings = CaeSettings(length=32, batch=3)
+    train_cae([pack], tmp_path, Budget.parse("1steps"), settings, say=lambda line: None)
+    rng = np.random.default_rng([settings.seed, 0])
+    windows = Windows([pack], ["train"], 32, torch.device("cpu"))
+    positions, observed = next(given for given in drawn if len(given[0]) == 3)
+    assert torch.equal(positions, windows.draw(rng, 3))
+    assert np.array_equal(observed.numpy(), corrupt(rng, settings, 0.0, 3))
 
 
 def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):

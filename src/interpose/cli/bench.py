@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Literal
 from cyclopts import App
 
 from interpose.cli.console import console, say, say_json
+from interpose.cli.research import needs_torch
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -70,6 +71,8 @@ def denoise(
 ) -> None:
     """Kaufmann et al. 2020, table 2: joint error of noisy clips of 4 s, before and after denoising.
 
+    As users meet it, on skeletons. Networks alone, as in the paper: interpose bench noise.
+
     Try:
       interpose bench denoise --data data --split test
 
@@ -84,6 +87,90 @@ def denoise(
 
     with _bar() as progress:
         result = run(data, split, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
+def noise(
+    *,
+    data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
+    split: Literal["validation", "test"] = "validation",
+    most: int = 400,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Kaufmann et al. 2020, table 2, as in the paper: joint error of networks on noise and lost joints.
+
+    Of the installed network and of others, alone, on positions that belong to no skeleton;
+    needs PyTorch. What denoising does for users: interpose bench denoise.
+
+    Try:
+      interpose bench noise --data data --split test
+      interpose train cae --out runs/noise --set noise=0.3
+      interpose export cae --run runs/noise --out runs/noise/weights
+      interpose bench noise --weights runs/noise/weights --weights runs/holden/weights
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
+        split: validation for development, test for final figures.
+        most: windows, drawn at random from all of them.
+        json: print JSON for other programs.
+        markdown: print only the table, in Markdown.
+    """
+    from functools import partial
+
+    from interpose.evaluation.infilling import named
+    from interpose.evaluation.noise import run
+
+    with needs_torch("run networks on noise"):
+        from interpose.training.cae import reconstruct, trained
+    cards = named([*_trained([], "cae"), *(_trained(weights, "cae") if weights else [])])
+    networks = {row: partial(reconstruct, trained(card)) for row, card in cards.items()}
+    with _bar() as progress:
+        result = run(data, networks, cards, split, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
+def bones(
+    *,
+    data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    plot: Path | None = None,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Kaufmann et al. 2020, figure 5: how long bones are in motion that networks reconstruct.
+
+    Try:
+      interpose bench bones --data data --weights runs/holden/weights --plot bones.svg
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
+        split: validation for development, test for final figures.
+        most: windows of each data set; all without it.
+        plot: an SVG file to draw the box plots into.
+        json: print JSON for other programs.
+        markdown: print only the table, in Markdown.
+    """
+    from interpose.evaluation.bones import run
+
+    cards = [*_trained([], "cae"), *(_trained(weights, "cae") if weights else [])]
+    with _bar() as progress:
+        result = run(data, cards, split, most, progress)
+    if plot is not None:
+        result.plot(plot)
     if json:
         say_json(result.to_dict())
     else:
@@ -200,6 +287,42 @@ def threshold(
         result.plot(plot)
     if save:
         replace(card, auto=result.to_dict()).save(card.path)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(str(result))
+
+
+@bench.command
+def context(
+    *,
+    data: Path = Path("data"),
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = 6,
+    plot: Path | None = None,
+    json: bool = False,
+) -> None:
+    """Kaufmann et al. 2020, section 4.2: error by length of gap, and by what is known beside it.
+
+    Gaps of .07 to 4 s; and .03 to .83 s of motion on either side of a gap, for each kind of
+    motion, with how much of it is enough. docs/filling.md says what follows from it.
+
+    Try:
+      interpose bench context --data data --plot context.svg
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        split: validation for development, test for final figures.
+        most: windows of each kind of motion, and half as many where all are taken together.
+        plot: an SVG file to draw the errors by kind of motion into.
+        json: print JSON for other programs.
+    """
+    from interpose.evaluation.context import run
+
+    with _bar() as progress:
+        result = run(data, split, most, progress)
+    if plot is not None:
+        result.plot(plot)
     if json:
         say_json(result.to_dict())
     else:
@@ -325,6 +448,185 @@ def hdm05(
     with _bar() as progress:
         result = measure(data, _trained([weights] if weights else [])[0], split, most, progress)
     _print(result, json)
+
+
+@bench.command
+def human(
+    *,
+    real: Path | None = None,
+    generated: list[Path] = [],  # noqa: B006
+    survey: Path = Path("survey"),
+    relative: bool = False,
+    seed: int = 0,
+    votes: list[Path] = [],  # noqa: B006
+    force: bool = False,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Hernandez Ruiz et al. 2019, table 2: how often people take generated clips for recorded ones.
+
+    With --real and --generated it makes a page on which a person judges one clip after the
+    other. Each person saves a file; with --votes these are counted.
+
+    Try:
+      interpose bench human --real clips/recorded --generated clips/stmi-gan --survey survey
+      interpose bench human --survey survey --votes votes-ana.json --votes votes-ben.json
+
+    Args:
+        real: a folder of recorded clips.
+        generated: a folder of generated clips, called as their model is; may be repeated.
+        survey: the folder of the survey: index.html for people, key.json for whoever counts.
+        relative: show poses alone: the hips stay in one place and face one way.
+        seed: of the order of the clips.
+        votes: a file that the page saved; may be repeated.
+        force: replace an existing survey.
+        json: print JSON for other programs.
+        markdown: print only the table, in Markdown.
+    """
+    from interpose.evaluation.human import read_key, read_votes, tally
+
+    if real is not None or generated:
+        if votes:
+            why = "a survey is made before anybody votes"
+            raise RequestError("--votes does not go with --real", why, "Leave one of them out.")
+        _survey(real, generated, survey, relative, seed, force, json)
+        return
+    key = read_key(survey / "key.json") if votes else {}
+    result = tally(key, [read_votes(path, key) for path in votes])
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+def _survey(
+    real: Path | None,
+    generated: list[Path],
+    folder: Path,
+    relative: bool,
+    seed: int,
+    force: bool,
+    json: bool,
+) -> None:
+    """Write a survey: a page, and beside it the key."""
+    from json import dumps
+
+    from interpose.cli.outputs import write_text
+    from interpose.evaluation.human import survey
+
+    if real is None or not generated:
+        raise RequestError(
+            "there is nothing to compare",
+            "a survey needs recorded and generated clips",
+            "Name their folders: --real clips/recorded --generated clips/stmi-gan.",
+        )
+    page, key = folder / "index.html", folder / "key.json"
+    for path in (page, key):
+        if path.exists() and not force:
+            fix = "Choose another folder with --survey, or add --force: votes on the old one are lost then."
+            raise RequestError(f"cannot write {path}", "the file exists already", fix)
+    made = survey(real, generated, relative, seed)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RequestError(
+            f"cannot make the folder {folder}", error.strerror or str(error), "Choose another with --survey."
+        ) from None
+    write_text(page, made.page)
+    write_text(key, dumps(made.key, indent=1) + "\n")
+    if json:
+        say_json(made.key | {"page": str(page), "notes": list(made.notes)})
+        return
+    for note in made.notes:
+        say(f"note: {note}")
+    say(f"wrote {page}: {len(made.key['clips'])} clips; give it to people, who open it in a browser")
+    say(f"wrote {key}: which clip is which; keep it to yourself")
+
+
+@bench.command
+def occlusion(
+    *,
+    data: Path = Path("data"),
+    drawn: Literal["exact", "code"] = "exact",
+    split: Literal["validation", "test"] = "validation",
+    most: int | None = None,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Hernandez Ruiz et al. 2019, table 3: joint error where 80 % of joints, limbs, frames or values is lost.
+
+    Joints and limbs are lost for a whole clip of 4 s, as in the public code of the
+    paper, and frame by frame, as its caption says.
+
+    Try:
+      interpose bench occlusion --data data --split test
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        drawn: exact; or code, as the public code draws: with replacement, so that about 55 % is lost.
+        split: validation for development, test for final figures.
+        most: windows of each data set; all without it.
+        json: print JSON for other programs.
+        markdown: print only the table of all windows, in Markdown.
+    """
+    from interpose.evaluation.occlusion import run
+
+    with _bar() as progress:
+        result = run(data, split, drawn, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
+def forecasting(
+    *,
+    data: Path = Path("data"),
+    weights: list[Path] = [],  # noqa: B006
+    split: Literal["validation", "test"] = "validation",
+    fps: Literal[5, 30] = 5,
+    variant: Literal["paper", "code"] = "paper",
+    samples: int = 5,
+    most: int | None = None,
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Hernandez Ruiz et al. 2019, table 1: whether forecasts of 4 s go on moving as people do.
+
+    Entropies of power spectra, and their divergence from those of real motion, second by
+    second; distances to the truth, diversity, and what the distance prefers. The installed
+    weights of STMI-GAN are a row, and those of every folder named.
+
+    Try:
+      interpose bench forecasting --data data --split test
+      interpose train seq2seq --out runs/seq2seq
+      interpose export seq2seq --run runs/seq2seq --out runs/seq2seq/weights
+      interpose train stmi-gan --out runs/nogan --set config=paper --set branches=none
+      interpose export stmi-gan --run runs/nogan --out runs/nogan/weights
+      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/nogan/weights
+
+    Args:
+        data: the folder with the unpacked data sets; docs/data.md says where to get them.
+        weights: a folder that `interpose export` wrote of stmi-gan or seq2seq; may be repeated.
+        split: validation for development, test for final figures.
+        fps: frames a second that are measured: 5 as in the paper, or 30, which its network does not make.
+        variant: spectra by the formulas of the paper, or as its public code computes them.
+        samples: forecasts of each window by other noise, to measure diversity.
+        most: windows of each data set; all without it.
+        json: print JSON for other programs, with both variants.
+        markdown: print only table 1, in Markdown.
+    """
+    from interpose.evaluation.forecasters import installed, load
+    from interpose.evaluation.forecasting import run
+
+    with _bar() as progress:
+        cards = installed() + load(weights)
+        result = run(data, split, cards, fps, variant, samples, most, progress)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
 
 
 def _trained(folders: list[Path], method: str = "cmib") -> list[Card]:

@@ -215,6 +215,4 @@ def seq2seq(
     """
     with needs_torch("train a network"):
         from interpose.training.seq2seq import Seq2SeqSettings, train_seq2seq
-    _train(
-        train_seq2seq, Seq2SeqSettings(), "seq2seq", packs, out, budget, splits, start, set, shipped=False
-    )
+    _train(train_seq2seq, Seq2SeqSettings(), "seq2seq", packs, out, budget, splits, start, set, shipped=False)

@@ -110,7 +110,7 @@ class Infilling:
             "split": self.split,
             "windows": dict(self.counts),
             "unit": "cm",
-            "networks": {row: _origin(network.card) for row, network in self.networks.items()},
+            "networks": {row: origin(network.card) for row, network in self.networks.items()},
             "errors": groups,
             "feet": feet,
             "solve_error": float(np.mean(self.solves)) if self.solves else None,
@@ -161,7 +161,7 @@ class Infilling:
             f"Solve: {np.mean(self.solves):.2f} cm from the network's positions.",
             f"Root drift before correction: {drift}.",
             f"Fell back to the spline (by gap length): {dict(self.fallen)}.",
-            *(f"{row}: {_in_words(network.card)}." for row, network in self.networks.items()),
+            *(f"{row}: {in_words(network.card)}." for row, network in self.networks.items()),
         ]
         return "\n\n".join([*parts, self.feet_table(), "\n".join(notes), "\n".join(checks)])
 
@@ -209,7 +209,8 @@ def run(
         progress: told how it goes.
         trained: weights to compare with, a row each.
     """
-    result = Infilling(split, named(trained))
+    networks = {f"{name}, true trajectory": Cae(card) for name, card in named(trained).items()}
+    result = Infilling(split, networks)
     chosen = list(windows(data, DATASETS, split, most=most, progress=lambda line: progress(0.0, line)))
     for done, window in enumerate(chosen):
         result.counts[window.dataset] += 1
@@ -220,29 +221,32 @@ def run(
     return result
 
 
-def named(cards: Sequence[Card]) -> dict[str, Cae]:
-    """A row for each of some weights, named by the network and how it was trained."""
-    rows: dict[str, Cae] = {}
+def named(cards: Sequence[Card]) -> dict[str, Card]:
+    """Some weights by a name for their row: the network and how it was trained."""
+    rows: dict[str, Card] = {}
     for card in cards:
         how = card.training
         gap = f"gaps of {how['gap'] / card.fps:g} s" if how.get("gap") else "curriculum"
         loss = [how["loss"].upper()] if how.get("loss", "l1") != "l1" else []
         bones = [f"bones {how['bones']:g}"] if how.get("bones") else []
-        row = f"{card.name} ({', '.join([gap, *loss, *bones])}), true trajectory"
+        noise = ["also on noise"] if how.get("noise") else []
+        row = f"{card.name} ({', '.join([gap, *loss, *bones, *noise])})"
         # Two that were trained alike, by another budget or seed: the folder tells them apart.
-        rows[f"{row}, {card.path.parent}" if row in rows else row] = Cae(card)
+        rows[f"{row}, {card.path.parent}" if row in rows else row] = card
     return rows
 
 
-def _origin(card: Card) -> dict[str, Any]:
-    """Where weights come from."""
-    figures = {name: card.training[name] for name in ("parameters", "device_hours")}
+def origin(card: Card) -> dict[str, Any]:
+    """Where weights come from, and which splits they have seen: an error on these flatters."""
+    figures = {name: card.training[name] for name in ("parameters", "device_hours", "splits")}
     return {**figures, "folder": str(card.path.parent)}
 
 
-def _in_words(card: Card) -> str:
-    how = _origin(card)
-    return f"{how['parameters']:,} parameters, {how['device_hours']:.2f} h of training, {how['folder']}"
+def in_words(card: Card) -> str:
+    """The same for the notes below a table."""
+    how = origin(card)
+    size, hours, splits = f"{how['parameters']:,}", f"{how['device_hours']:.2f}", " and ".join(how["splits"])
+    return f"{size} parameters, {hours} h of training on {splits}, {how['folder']}"
 
 
 def _measure(result: Infilling, window: Window, frames: int) -> None:

@@ -1,7 +1,8 @@
-"""Windows of held-out performers, cut the same way for every row of a table."""
+"""Windows of performers, held-out ones as a rule, cut the same way for every row of a table."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,17 +17,19 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import Humanoid, find_humanoid
 from interpose.skeletons.body import facing
 
-SPLITS = ("validation", "test")
+SPLITS = ("train", "validation", "test")
 
 
 @dataclass(frozen=True)
 class Window:
-    """A piece of a clip at its own skeleton, and the canonical positions (T, 22, 3) of it in metres."""
+    """A piece of a clip at its own skeleton, the canonical positions (T, 22, 3) of it in metres, and what the
+    data set calls the motion."""
 
     dataset: str
     clip: Clip
     body: Humanoid
     positions: np.ndarray
+    label: str = ""
 
     def centred(self, gap: int) -> Gap:
         """The range of `gap` frames in the middle."""
@@ -64,14 +67,16 @@ def windows(
     step: int = 120,
     most: int | None = None,
     progress: Callable[[str], None] = lambda line: None,
+    by_label: bool = False,
 ) -> Iterator[Window]:
     """Whole windows of the performers of a split, at 30 fps.
 
     Args:
         data: the folder that holds the data sets.
-        split: "validation" for development, "test" for final figures.
+        split: "validation" for development, "test" for final figures; "train" for what networks have seen.
         length, step: frames.
         most: windows per data set, spread evenly over all of them; None for all.
+        by_label: so many of each label instead.
     """
     if split not in SPLITS:
         raise RequestError(
@@ -80,7 +85,7 @@ def windows(
     for dataset in datasets:
         entries = clips(dataset, data, split)
         progress(f"{dataset}: reading {len(entries)} clips")
-        starts: list[tuple[Clip, int]] = []
+        starts: dict[str, list[tuple[str, Clip, int]]] = defaultdict(list)
         for entry in entries:
             clip = entry.load()
             every = max(1, round(clip.fps / 30.0))
@@ -92,10 +97,13 @@ def windows(
                 clip.translated,
                 entry.path.stem,
             )
-            starts += [(clip, start) for start in range(0, len(clip) - length + 1, step)]
-        if most is not None and most < len(starts):
-            starts = [starts[i] for i in np.linspace(0, len(starts) - 1, most).astype(int)]
-        for clip, start in starts:
-            cut = clip.slice(start, start + length)
-            body = find_humanoid(cut)
-            yield Window(dataset, cut, body, body.positions(cut))
+            starts[entry.label if by_label else ""] += [
+                (entry.label, clip, start) for start in range(0, len(clip) - length + 1, step)
+            ]
+        for some in starts.values():
+            count = len(some) if most is None else min(most, len(some))
+            for i in np.linspace(0, len(some) - 1, count).astype(int):
+                label, clip, start = some[i]
+                cut = clip.slice(start, start + length)
+                body = find_humanoid(cut)
+                yield Window(dataset, cut, body, body.positions(cut), label)

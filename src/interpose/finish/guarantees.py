@@ -569,7 +569,7 @@ def _dull(alive: float, gap: Gap, first: int) -> str:
 def _scant(known: Observation, gap: Gap, fps: float) -> str | None:
     """What to say of a gap of the whole pose beside which too little is known for a network.
 
-    Nothing where a side has a single frame, which is a key, or none at all.
+    Nothing where a side has a single frame, which is a key, or none at all; nor of short gaps.
     """
     # Of most joints: a joint that is missing all the time, or a part laid into a gap, makes no difference.
     holes = [(0, 0), *runs(known.rotation.mean(axis=1) < 0.5), (len(known.rotation),) * 2]
@@ -577,11 +577,12 @@ def _scant(known: Observation, gap: Gap, fps: float) -> str | None:
     before, after = holes[at][0] - holes[at - 1][1], holes[at + 1][0] - holes[at][1]
     length = holes[at][1] - holes[at][0]
     enough = math.ceil(max(BESIDE * fps, SHARE * length))
-    if min(before, after) < 2 or min(before, after) >= enough:
+    if length <= enough or not 2 <= min(before, after) < enough:
         return None
+    few = [f"{n} frames {side} it" for n, side in ((before, "before"), (after, "after")) if n < enough]
     return (
-        f"{before} frames are known before it and {after} after it, and a gap of {length} needs {enough} on "
-        "either side to be filled well: leave out less, or give a key inside of it"
+        f"only {' and '.join(few)} are known, and a gap of {length} needs {enough} on either side to be "
+        "filled well: leave more around it, or give a key inside of it"
     )
 
 

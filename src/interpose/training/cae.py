@@ -10,6 +10,9 @@ The other rows of table 1 and the ablations are settings of the same recipe: the
     Holden et al. (60)  network=holden gap=30 loss=l2 learning_rate=1e-5
     section 3.3         loss=l2
     section 4.1         bones=1
+    Table 2, on noise   noise=0.3
+
+Such a row is trained by `interpose train cae --out runs/noise --set noise=0.3`.
 """
 
 from __future__ import annotations
@@ -29,7 +32,7 @@ from interpose.methods.weights import Card
 from interpose.models.cae import ROWS, Image, Infiller, to_image
 from interpose.models.holden import HoldenInfiller
 from interpose.models.vanilla import Vanilla
-from interpose.observation.corruption import gap_mask, joints_mask
+from interpose.observation.corruption import gap_mask, gaussian_noise, joints_mask, joints_per_frame_mask
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
@@ -41,6 +44,10 @@ NETWORKS: dict[str, Callable[[], Infiller]] = {
     "vanilla": lambda: Infiller(Vanilla()),
     "holden": HoldenInfiller,
 }
+POSITIONS = 3 * len(JOINTS)  # rows of the image; what follows is the trajectory, and contacts where there are
+# The worst that table 2 does to a clip, and training on noise with it: the standard deviation of noise in
+# metres, 1.5 of the paper's units, and the share of joints that a frame loses.
+NOISE, LOST = 1.5 * 0.0625, 0.5
 LOSSES: dict[str, Callable[[Tensor], Tensor]] = {"l1": torch.abs, "l2": torch.square}
 
 
@@ -59,6 +66,7 @@ class CaeSettings(Settings):
     gap: int = 0  # frames of all gaps, without lost joints; 30, a second, are the paper's (60); 0: curriculum
     loss: str = "l1"  # or "l2", of normalised rows
     bones: float = 0.0  # weight of the loss on the lengths of bones
+    noise: float = 0.0  # share of the clips that are whole but noisy, or lose joints frame by frame
 
     def __post_init__(self) -> None:
         if self.network not in NETWORKS:
@@ -93,6 +101,44 @@ def corrupt(rng: np.random.Generator, settings: CaeSettings, fraction: float, ba
     return np.where(rng.random((batch, 1, 1)) < settings.joints_share, joints, gaps)
 
 
+def disturb(
+    rng: np.random.Generator, settings: CaeSettings, batch: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What some clips suffer: half of them noise, half the loss of joints in single frames.
+
+    How much of it is drawn uniformly, up to the worst of table 2.
+
+    Returns:
+        Which clips (B,) these are, the noise (B, T, 22, 3) in metres, and which joints are kept (B, T, 22).
+    """
+    shape = (batch, settings.length, len(JOINTS))
+    chosen = rng.random(batch) < settings.noise
+    noise, kept = np.zeros((*shape, 3), np.float32), np.ones(shape, bool)
+    for clip in np.flatnonzero(chosen):
+        if rng.random() < 0.5:
+            noise[clip] = gaussian_noise(rng, noise[clip], rng.uniform(0.0, NOISE))
+        else:
+            kept[clip] = joints_per_frame_mask(rng, 1, shape[1], shape[2], rng.uniform(0.0, LOST))[0]
+    return chosen, noise, kept
+
+
+def predict_disturbed(model: Infiller, image: Image, noise: Tensor, kept: Tensor) -> Tensor:
+    """`model.predict` of an image with noise (B, T, 22, 3) in metres added to its positions, and without the
+    joints that are not kept (B, T, 22).
+
+    As in section 4.1 that concerns positions alone, in the body's frame; the trajectory is known as it is, so
+    what is shown and what should come out are in the same frame, the clean one. Noise on global positions
+    would turn and shift that frame: at sigma 1 the line of hips and shoulders sways by 13 degrees, and
+    nothing tells from which frame to answer.
+    """
+    rows, known = model.normalised(image)
+    added = noise.flatten(2).transpose(1, 2) / model.std[:POSITIONS]
+    rows = torch.cat([rows[:, :POSITIONS] + added, rows[:, POSITIONS:]], dim=1)
+    seen = known[:, :POSITIONS] & kept.repeat_interleave(3, dim=2).transpose(1, 2)
+    known = torch.cat([seen, known[:, POSITIONS:]], dim=1)
+    return model.network(torch.where(known, rows, 0.0)[:, None])[:, 0]
+
+
 def fit_normaliser(model: Infiller, windows: Windows, rng: np.random.Generator) -> None:
     """Mean and standard deviation of every row over fully observed training windows."""
     rows = []
@@ -117,7 +163,7 @@ def bone_error(model: Infiller, answer: Tensor, truth: Tensor) -> Tensor:
         model: whose rows they are.
         answer, truth: normalised rows (B, R, T).
     """
-    positions = slice(0, 3 * len(JOINTS))
+    positions = slice(0, POSITIONS)
     mean, std = model.mean[positions], model.std[positions]
     lengths = []
     for rows in (answer, truth):
@@ -168,10 +214,17 @@ def train_cae(
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         positions = windows.draw(rng, batch)
-        observed = torch.from_numpy(corrupt(rng, settings, fraction, batch)).to(device)
-        image = to_image(positions, observed)
+        observed = corrupt(rng, settings, fraction, batch)
+        if settings.noise:
+            chosen, *disturbance = disturb(rng, settings, batch)
+            observed[chosen] = True
+        image = to_image(positions, torch.from_numpy(observed).to(device))
         with torch.autocast(device.type, torch.bfloat16):
-            answer = model.predict(image)
+            if settings.noise:
+                noise, kept = (torch.from_numpy(one).to(device) for one in disturbance)
+                answer = predict_disturbed(model, image, noise, kept)
+            else:
+                answer = model.predict(image)
         truth = model.normalised(image)[0]
         wrong = LOSSES[settings.loss](answer.float() - truth).mean()
         return wrong + settings.bones * bone_error(model, answer.float(), truth) if settings.bones else wrong
@@ -207,6 +260,32 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
         figures[f"gap{gap}"] = 100 * float(wrong.mean())
         figures[f"ratio{gap}"] = float(wrong.mean() / off.mean())
     return figures
+
+
+def trained(card: Card) -> Infiller:
+    """The network of some weights, back from the graph that they were exported into."""
+    model = NETWORKS[card.training.get("network", "cae")]()
+    restore(model, card.onnx)
+    return model.eval()
+
+
+@torch.no_grad()
+def reconstruct(model: Infiller, positions: np.ndarray, noise: np.ndarray, kept: np.ndarray) -> np.ndarray:
+    """What a network makes of whole motions that are disturbed as in table 2.
+
+    Args:
+        positions: (B, T, 22, 3) metres of a canonical leg at 30 fps, undisturbed.
+        noise: (B, T, 22, 3) metres added to them in the body's frame.
+        kept: (B, T, 22) which joints are not lost.
+
+    Returns:
+        Poses (B, T, 22, 3) in metres, in the body's frame.
+    """
+    given = torch.from_numpy(positions).float()
+    image = to_image(given, torch.ones_like(given[..., 0], dtype=torch.bool))
+    rows = predict_disturbed(model, image, torch.from_numpy(noise).float(), torch.from_numpy(kept))
+    body = (rows * model.std + model.mean)[:, :POSITIONS].transpose(1, 2).unflatten(2, (len(JOINTS), 3))
+    return (body + image.floor[:, None, None, None] * body.new_tensor([0.0, 1.0, 0.0])).double().numpy()
 
 
 def _part(image: Image, start: int) -> Image:
