@@ -76,6 +76,8 @@ def test_windows_are_motions_of_the_canonical_body(motions):
     placed = canonical_positions(motions.rotation[1], motions.positions[1, :, 0], motions.bones[1])
     assert np.abs(placed - motions.positions[1]).max() < 1e-6
     assert motions.seen.positions.shape[1] == motions.seen.rotation.shape[1] == SEEN
+    fifths = forecasters.thin(np.arange(SEEN)[None], 30, 5)[0]
+    assert fifths.tolist() == [5, 11, 17, 23, 29, 35, 41, 47, 53, 59], "the last frame is among them"
 
 
 def test_the_truth_as_a_forecast_is_perfect_and_its_mirror_in_time_only_as_lively(motions):

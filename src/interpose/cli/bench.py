@@ -592,19 +592,17 @@ def forecasting(
     json: bool = False,
     markdown: bool = False,
 ) -> None:
-    """Hernandez Ruiz et al. 2019, table 1: whether forecasts of 4 s go on moving as people do.
+    """Hernandez Ruiz et al. 2019, table 1: do forecasts of 4 s move as people do?
 
-    Entropies of power spectra, and their divergence from those of real motion, second by
-    second; distances to the truth, diversity, and what the distance prefers. The installed
-    weights of STMI-GAN are a row, and those of every folder named.
+    Entropies of power spectra, and how far these are from real motion's, second by
+    second; distances to the truth, and diversity. The installed weights of STMI-GAN
+    are a row, and so are those of each folder named.
 
     Try:
       interpose bench forecasting --data data --split test
       interpose train seq2seq --out runs/seq2seq
       interpose export seq2seq --run runs/seq2seq --out runs/seq2seq/weights
-      interpose train stmi-gan --out runs/nogan --set config=paper --set branches=none
-      interpose export stmi-gan --run runs/nogan --out runs/nogan/weights
-      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/nogan/weights
+      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/a
 
     Args:
         data: the folder with the unpacked data sets; docs/data.md says where to get them.
@@ -612,7 +610,7 @@ def forecasting(
         split: validation for development, test for final figures.
         fps: frames a second that are measured: 5 as in the paper, or 30, which its network does not make.
         variant: spectra by the formulas of the paper, or as its public code computes them.
-        samples: forecasts of each window by other noise, to measure diversity.
+        samples: forecasts of each window by other noise, to measure diversity; 1 measures none.
         most: windows of each data set; all without it.
         json: print JSON for other programs, with both variants.
         markdown: print only table 1, in Markdown.

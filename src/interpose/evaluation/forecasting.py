@@ -368,9 +368,8 @@ def run(
             judge.spectra(row, thin(others[:, SEEN:], FPS, rate), others[:, SEEN - 1])
             continue
         noisy = row.card is not None and row.card.method == "stmi-gan"
-        made = [
-            thin(row.forecast(motions.seen, seed), row.fps, rate) for seed in range(samples if noisy else 1)
-        ]
+        seeds = range(max(1, samples) if noisy else 1)
+        made = [thin(row.forecast(motions.seen, seed), row.fps, rate) for seed in seeds]
         judge.spectra(row, made[0], motions.positions[:, SEEN - 1])
         judge.distances(row, made[0])
         if len(made) > 1:

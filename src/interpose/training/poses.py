@@ -6,6 +6,7 @@ points, sampled from a Gaussian process, along which the body is turned.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -51,6 +52,15 @@ def labels_of(packs: Sequence[Pack], splits: Sequence[str]) -> tuple[str, ...]:
     return ("", *sorted(found - {""}))
 
 
+def mirrored(labels: Sequence[str]) -> list[int]:
+    """For each label that of the mirrored motion, by index: left becomes right; 0, for none, if it has none."""
+
+    def swap(label: str) -> str:
+        return re.sub("left|right", lambda side: "right" if side[0] == "left" else "left", label)
+
+    return [labels.index(swap(label)) if swap(label) in labels else 0 for label in labels]
+
+
 class Poses:
     """All clips of some splits that are long enough, in memory."""
 
@@ -85,6 +95,7 @@ class Poses:
         self.bones = torch.from_numpy(np.array(bones, np.float32)).to(device)
         self.label = torch.tensor(label, device=device)
         self.sides = torch.tensor(SIDES, device=device)
+        self.mirrored = torch.tensor(mirrored(labels), device=device)
 
     @property
     def frames(self) -> int:
@@ -111,7 +122,7 @@ class Poses:
             torch.where(flip[..., None], mirrored, drawn.rotation),
             torch.where(flip, drawn.root * side, drawn.root),
             torch.where(flip, drawn.bones[:, self.sides] * side, drawn.bones),
-            drawn.label,
+            torch.where(flip[:, 0, 0], self.mirrored[drawn.label], drawn.label),
         )
 
     def spread(self, count: int, length: int) -> Batch:
