@@ -105,8 +105,8 @@ def noise(
 ) -> None:
     """Kaufmann et al. 2020, table 2, as in the paper: joint error of networks on noise and lost joints.
 
-    Of the installed network and of others, alone, on positions that belong to no skeleton;
-    needs PyTorch. What denoising does for users: interpose bench denoise.
+    The installed network and others, alone, on positions of no skeleton; needs PyTorch.
+    What denoising does for users is measured by interpose bench denoise.
 
     Try:
       interpose bench noise --data data --split test

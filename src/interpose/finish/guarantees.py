@@ -124,7 +124,8 @@ def complete(
     if hanging.any() and not isinstance(method, Layer):
         body = complete(clip, without(observation, hanging), method, seed, fallback, limit, first=first)
         layer = Layer(method.name, body.clip, body.raw, hanging)
-        return _told_of(body, complete(clip, observation, layer, seed, fallback, limit, first=first))
+        # Where what is laid on it jumps, another body would not help: it is said, and this one kept.
+        return _told_of(body, complete(clip, observation, layer, seed, layer, limit, first=first))
     gaps = known.gaps(clip.skeleton)
     if not gaps:
         return Completion(

@@ -53,7 +53,7 @@ def labels_of(packs: Sequence[Pack], splits: Sequence[str]) -> tuple[str, ...]:
 
 
 def mirrored(labels: Sequence[str]) -> list[int]:
-    """For each label that of the mirrored motion, by index: left becomes right; 0, for none, if it has none."""
+    """For each label that of the mirrored motion, by index, left for right; 0 where there is none."""
 
     def swap(label: str) -> str:
         return re.sub("left|right", lambda side: "right" if side[0] == "left" else "left", label)
