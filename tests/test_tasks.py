@@ -127,9 +127,9 @@ def test_a_lost_joint_does_not_keep_the_network_from_a_gap(long_walk):
 
 
 def test_auto_says_why_the_network_does_not_fill_a_long_gap(cmu_walk):
-    report = tasks.fill(cmu_walk, [Gap(40, 140)], "auto").report.gaps[0]
+    report = tasks.fill(cmu_walk, [Gap(40, 165)], "auto").report.gaps[0]
     assert report.method == "spline"
-    assert "100 frames" in " ".join(report.notes)
+    assert "125 frames" in " ".join(report.notes)
 
 
 def test_pins_are_refused_rather_than_ignored(cmu_walk):
@@ -150,7 +150,7 @@ def test_raw_is_what_the_network_said(cmu_walk):
 
 
 def test_too_long_for_the_network_is_filled_by_the_spline_and_said(cmu_walk):
-    done = tasks.fill(cmu_walk, [Gap(40, 140)], "cae")
+    done = tasks.fill(cmu_walk, [Gap(40, 165)], "cae")
     assert done.report.gaps[0].method == "spline"
     assert "100 frames" in " ".join(done.report.gaps[0].notes)
 

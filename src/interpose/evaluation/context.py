@@ -24,8 +24,7 @@ from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import Window, windows
 from interpose.finish import complete, measures
 from interpose.finish.guarantees import DULL
-from interpose.methods import auto, registry, weights
-from interpose.methods.cae import Cae
+from interpose.methods import auto, registry
 from interpose.methods.protocol import Method
 from interpose.observation import Gap
 from interpose.show.plot import COLORS, line_plot
@@ -266,10 +265,7 @@ def _measure(
 
 
 def _method(name: str, shown: Window, hole: Gap) -> Method:
-    """The method of a row: the network also beyond the gaps that it was made for, and `auto` as users get it,
-    to whom a single frame beside a gap is a key."""
-    if name == "cae":
-        return Cae(replace(weights.find(name), max_gap=max(GAPS)))
+    """The method of a row: of `auto` as users get it, to whom a single frame beside a gap is a key."""
     if name == "auto":
         return auto.choose(shown.clip, hole, 2 if hole.start == 1 else 0)[0]
     return registry.get(name)
