@@ -152,7 +152,7 @@ def test_raw_is_what_the_network_said(cmu_walk):
 def test_too_long_for_the_network_is_filled_by_the_spline_and_said(cmu_walk):
     done = tasks.fill(cmu_walk, [Gap(40, 165)], "cae")
     assert done.report.gaps[0].method == "spline"
-    assert "100 frames" in " ".join(done.report.gaps[0].notes)
+    assert "125 frames" in " ".join(done.report.gaps[0].notes)
 
 
 def test_what_is_no_humanoid_is_filled_by_the_spline_with_the_reason():
