@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from interpose.cli.console import console, say, say_json
 from interpose.cli.research import needs_torch
@@ -18,18 +18,47 @@ if TYPE_CHECKING:
     from interpose.evaluation.conditions import Table
     from interpose.methods.weights import Card
 
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Asked:
+    """What all benches on published data are asked."""
+
+    data: Annotated[
+        Path, Parameter(help="the folder with the unpacked data sets; docs/data.md says where to get them.")
+    ] = Path("data")
+    split: Annotated[
+        Literal["validation", "test"],
+        Parameter(help="validation performers for development, test performers for final figures."),
+    ] = "validation"
+    json: Annotated[bool, Parameter(negative="", help="print JSON for other programs.")] = False
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Tabled(Asked):
+    """The same of those whose main result is one table."""
+
+    markdown: Annotated[
+        bool, Parameter(negative="", help="print only the table of all windows, in Markdown.")
+    ] = False
+
+
+class Result(Protocol):
+    """What a bench measured; the text of it tells everything."""
+
+    def to_dict(self) -> dict[str, Any]: ...
+
+
 bench = App(name="bench", help="Measure how good the methods are, by published protocols.")
 
 
 @bench.command
 def infilling(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 1: joint error when gaps of 0 to 60 frames in 4 s are filled.
 
@@ -43,31 +72,21 @@ def infilling(
       interpose bench infilling --weights runs/vanilla/weights
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
-        split: validation for development, test for final figures.
         most: windows of each data set; all without it.
-        json: print JSON for other programs.
-        markdown: print only the table of all windows, in Markdown.
     """
     from interpose.evaluation.infilling import run
 
     with _bar() as progress:
-        result = run(data, split, most, progress, _trained(weights, "cae") if weights else [])
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+        result = run(asked.data, asked.split, most, progress, _trained(weights, "cae") if weights else [])
+    _show(result, asked)
 
 
 @bench.command
 def denoise(
     *,
-    data: Path = Path("data"),
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 2: joint error of noisy clips of 4 s, before and after denoising.
 
@@ -77,31 +96,21 @@ def denoise(
       interpose bench denoise --data data --split test
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
-        split: validation for development, test for final figures.
         most: windows of each data set; all without it.
-        json: print JSON for other programs.
-        markdown: print only the table of all windows, in Markdown.
     """
     from interpose.evaluation.denoising import run
 
     with _bar() as progress:
-        result = run(data, split, most, progress)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+        result = run(asked.data, asked.split, most, progress)
+    _show(result, asked)
 
 
 @bench.command
 def noise(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     most: int = 400,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 2, as in the paper: joint error of networks on noise and lost joints.
 
@@ -115,12 +124,8 @@ def noise(
       interpose bench noise --weights runs/noise/weights --weights runs/holden/weights
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
-        split: validation for development, test for final figures.
         most: windows, drawn at random from all of them.
-        json: print JSON for other programs.
-        markdown: print only the table, in Markdown.
     """
     from functools import partial
 
@@ -132,23 +137,17 @@ def noise(
     cards = named([*_trained([], "cae"), *(_trained(weights, "cae") if weights else [])])
     networks = {row: partial(reconstruct, trained(card)) for row, card in cards.items()}
     with _bar() as progress:
-        result = run(data, networks, cards, split, most, progress)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+        result = run(asked.data, networks, cards, asked.split, most, progress)
+    _show(result, asked)
 
 
 @bench.command
 def bones(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
     plot: Path | None = None,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, figure 5: how long bones are in motion that networks reconstruct.
 
@@ -156,35 +155,25 @@ def bones(
       interpose bench bones --data data --weights runs/holden/weights --plot bones.svg
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
-        split: validation for development, test for final figures.
         most: windows of each data set; all without it.
         plot: an SVG file to draw the box plots into.
-        json: print JSON for other programs.
-        markdown: print only the table, in Markdown.
     """
     from interpose.evaluation.bones import run
 
     cards = [*_trained([], "cae"), *(_trained(weights, "cae") if weights else [])]
     with _bar() as progress:
-        result = run(data, cards, split, most, progress)
+        result = run(asked.data, cards, asked.split, most, progress)
     if plot is not None:
         result.plot(plot)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+    _show(result, asked)
 
 
 @bench.command
 def skeletons(
     *,
-    data: Path = Path("data"),
-    split: Literal["validation", "test"] = "validation",
     most: int | None = 60,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Every data set on its own skeleton and frame rate: error of finished fills, gaps of .5, 1 and 2 s.
 
@@ -192,33 +181,24 @@ def skeletons(
       interpose bench skeletons --data data --split test
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
-        split: validation for development, test for final figures.
         most: windows of each data set and length of gap, spread over all of them.
-        json: print JSON for other programs.
-        markdown: print only the table, in Markdown.
     """
     from interpose.evaluation.skeletons import run
 
     with _bar() as progress:
-        result = run(data, split, most, progress)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+        result = run(asked.data, asked.split, most, progress)
+    _show(result, asked)
 
 
 @bench.command
 def lafan1(
     *,
-    data: Path = Path("data"),
     method: list[str] = [],  # noqa: B006
     protocol: Literal["official", "cmib"] = "official",
     gaps: str | None = None,
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
     plot: Path | None = None,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """LAFAN1 in-betweening (Harvey et al. 2020): L2P, L2Q and NPSS exactly as its authors measure them.
 
@@ -230,14 +210,11 @@ def lafan1(
       interpose bench lafan1 --data data --gaps 5,15,30,45,60,80,120
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         method: a method to measure, by name, also one of another package. May be repeated.
         protocol: official; or cmib, as Kim et al. 2022 count: lengths with both keys, one frame of context.
         gaps: lengths in frames, separated by commas; those of the protocol without it.
-        split: validation (subject 4) for development, test (subject 5) for final figures.
         most: windows, spread over all of them; all without it.
         plot: an SVG file to draw the ratios to interpolation into.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.lafan1 import run
 
@@ -248,13 +225,10 @@ def lafan1(
             f"cannot read --gaps {gaps}", "it is a list of numbers of frames", "Write --gaps 5,15,30,45."
         ) from None
     with _bar() as progress:
-        result = run(data, split, protocol, lengths, method, most, progress)
+        result = run(asked.data, asked.split, protocol, lengths, method, most, progress)
     if plot is not None:
         result.plot(plot)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(str(result))
+    _show(result, asked)
 
 
 @bench.command
@@ -296,11 +270,9 @@ def threshold(
 @bench.command
 def context(
     *,
-    data: Path = Path("data"),
-    split: Literal["validation", "test"] = "validation",
     most: int | None = 6,
     plot: Path | None = None,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """Kaufmann et al. 2020, section 4.2: error by length of gap, and by what is known beside it.
 
@@ -311,32 +283,24 @@ def context(
       interpose bench context --data data --plot context.svg
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
-        split: validation for development, test for final figures.
         most: windows of each kind of motion, and half as many where all are taken together.
         plot: an SVG file to draw the errors by kind of motion into.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.context import run
 
     with _bar() as progress:
-        result = run(data, split, most, progress)
+        result = run(asked.data, asked.split, most, progress)
     if plot is not None:
         result.plot(plot)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(str(result))
+    _show(result, asked)
 
 
 @bench.command
 def representations(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 1: L2P of CMIB by how it holds rotations.
 
@@ -348,27 +312,22 @@ def representations(
       interpose bench representations --weights runs/euler/weights --weights runs/quaternion/weights
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cmib` wrote, may be repeated; the installed weights without.
-        split: validation (subject 4) for development, test (subject 5) for final figures.
         most: windows a length, spread over all of them; all without it.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.conditions import representations as measure
 
     with _bar() as progress:
-        result = measure(data, _trained(weights), split, most, progress)
-    _print([result], json)
+        result = measure(asked.data, _trained(weights), asked.split, most, progress)
+    _print([result], asked.json)
 
 
 @bench.command
 def anchors(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 5: by how much CMIB itself misses an anchor that was moved aside.
 
@@ -381,27 +340,22 @@ def anchors(
       interpose bench anchors --weights weights/cmib --weights runs/plain/weights
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cmib` wrote, may be repeated; the installed weights without.
-        split: validation (subject 4) for development, test (subject 5) for final figures.
         most: windows of walks and of runs, spread over all of them; all without it.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.conditions import anchors as measure
 
     with _bar() as progress:
-        result = measure(data, _trained(weights), split, most, progress)
-    _print([result], json)
+        result = measure(asked.data, _trained(weights), asked.split, most, progress)
+    _print([result], asked.json)
 
 
 @bench.command
 def actions(
     *,
-    data: Path = Path("data"),
     weights: Path | None = None,
-    split: Literal["validation", "test"] = "validation",
     most: int | None = 30,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 6: L2P of CMIB when it is told the right action, and each other one.
 
@@ -409,27 +363,22 @@ def actions(
       interpose bench actions --data data --split test
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cmib` wrote; the installed weights without.
-        split: validation (subject 4) for development, test (subject 5) for final figures.
         most: windows of each action and length, spread over all of them.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.conditions import actions as measure
 
     with _bar() as progress:
-        result = measure(data, _trained([weights] if weights else [])[0], split, most, progress)
-    _print(result, json)
+        result = measure(asked.data, _trained([weights] if weights else [])[0], asked.split, most, progress)
+    _print(result, asked.json)
 
 
 @bench.command
 def hdm05(
     *,
-    data: Path = Path("data"),
     weights: Path | None = None,
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
+    asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 4: L2P and L2Q of CMIB on MPI-HDM05, which its weights have not seen.
 
@@ -437,17 +386,14 @@ def hdm05(
       interpose bench hdm05 --data data --split test
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export cmib` wrote; the installed weights without.
-        split: validation (mm) for development, test (tr) for final figures.
         most: cuts a length, spread over all of them; all without it.
-        json: print JSON for other programs.
     """
     from interpose.evaluation.conditions import hdm05 as measure
 
     with _bar() as progress:
-        result = measure(data, _trained([weights] if weights else [])[0], split, most, progress)
-    _print(result, json)
+        result = measure(asked.data, _trained([weights] if weights else [])[0], asked.split, most, progress)
+    _print(result, asked.json)
 
 
 @bench.command
@@ -546,12 +492,9 @@ def _survey(
 @bench.command
 def occlusion(
     *,
-    data: Path = Path("data"),
     drawn: Literal["exact", "code"] = "exact",
-    split: Literal["validation", "test"] = "validation",
     most: int | None = None,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Hernandez Ruiz et al. 2019, table 3: joint error where 80 % of joints, limbs, frames or values is lost.
 
@@ -562,35 +505,25 @@ def occlusion(
       interpose bench occlusion --data data --split test
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         drawn: exact; or code, as the public code draws: with replacement, so that about 55 % is lost.
-        split: validation for development, test for final figures.
         most: windows of each data set; all without it.
-        json: print JSON for other programs.
-        markdown: print only the table of all windows, in Markdown.
     """
     from interpose.evaluation.occlusion import run
 
     with _bar() as progress:
-        result = run(data, split, drawn, most, progress)
-    if json:
-        say_json(result.to_dict())
-    else:
-        say(result.table() if markdown else str(result))
+        result = run(asked.data, asked.split, drawn, most, progress)
+    _show(result, asked)
 
 
 @bench.command
 def forecasting(
     *,
-    data: Path = Path("data"),
     weights: list[Path] = [],  # noqa: B006
-    split: Literal["validation", "test"] = "validation",
     fps: Literal[5, 30] = 5,
     variant: Literal["paper", "code"] = "paper",
     samples: int = 5,
     most: int | None = None,
-    json: bool = False,
-    markdown: bool = False,
+    asked: Tabled = Tabled(),
 ) -> None:
     """Hernandez Ruiz et al. 2019, table 1: do forecasts of 4 s move as people do?
 
@@ -605,26 +538,29 @@ def forecasting(
       interpose bench forecasting --weights runs/seq2seq/weights --weights runs/a
 
     Args:
-        data: the folder with the unpacked data sets; docs/data.md says where to get them.
         weights: a folder that `interpose export` wrote of stmi-gan or seq2seq; may be repeated.
-        split: validation for development, test for final figures.
         fps: frames a second that are measured: 5 as in the paper, or 30, which its network does not make.
         variant: spectra by the formulas of the paper, or as its public code computes them.
         samples: forecasts of each window by other noise, to measure diversity; 1 measures none.
         most: windows of each data set; all without it.
-        json: print JSON for other programs, with both variants.
-        markdown: print only table 1, in Markdown.
     """
     from interpose.evaluation.forecasters import installed, load
     from interpose.evaluation.forecasting import run
 
     with _bar() as progress:
         cards = installed() + load(weights)
-        result = run(data, split, cards, fps, variant, samples, most, progress)
-    if json:
+        result = run(asked.data, asked.split, cards, fps, variant, samples, most, progress)
+    _show(result, asked)
+
+
+def _show(result: Result, asked: Asked) -> None:
+    """Print a result as it was asked for."""
+    if asked.json:
         say_json(result.to_dict())
+    elif isinstance(asked, Tabled) and asked.markdown:
+        say(result.table())  # type: ignore[attr-defined]
     else:
-        say(result.table() if markdown else str(result))
+        say(str(result))
 
 
 def _trained(folders: list[Path], method: str = "cmib") -> list[Card]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from interpose.cli.console import say
 from interpose.cli.research import needs_torch
@@ -16,13 +17,25 @@ from interpose.errors import FileError
 export = App(name="export", help="Turn a training run into weights with a card (needs PyTorch).")
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Of:
+    """What becomes weights."""
+
+    run: Annotated[Path, Parameter(help="the folder of the training run.")]
+    packs: Annotated[Path, Parameter(help="the folder with the packs that it was trained on.")] = Path(
+        "packs"
+    )
+    splits: Annotated[
+        list[str], Parameter(help="what it was trained on: train (the default), or train,validation.")
+    ] = field(default_factory=list)
+
+
 @export.command
 def cae(
     *,
-    run: Path,
-    packs: Path = Path("packs"),
+    of: Of,
     out: Path = Path("weights/cae"),
-    splits: list[str] = [],  # noqa: B006
 ) -> None:
     """Write cae.onnx, its card cae.json, and the training log with its curves.
 
@@ -34,16 +47,13 @@ def cae(
       interpose export cae --run runs/vanilla --out runs/vanilla/weights
 
     Args:
-        run: the folder of the training run.
-        packs: the folder with the packs that it was trained on.
         out: the folder for the weights.
-        splits: what it was trained on: train (the default), or train,validation.
     """
     from interpose.methods.weights import FOLDERS
 
     with needs_torch("export a network"):
         from interpose.training.export import export_cae
-    _export(export_cae, run, packs, out, splits)
+    _export(export_cae, of, out)
     if out.resolve().parent in FOLDERS:
         say("Next, so that auto knows from which length on it is better: interpose bench threshold --save")
     else:
@@ -53,10 +63,8 @@ def cae(
 @export.command
 def cmib(
     *,
-    run: Path,
-    packs: Path = Path("packs"),
+    of: Of,
     out: Path = Path("weights/cmib"),
-    splits: list[str] = [],  # noqa: B006
 ) -> None:
     """Write cmib.onnx, its card cmib.json, and the training log with its curves.
 
@@ -64,23 +72,18 @@ def cmib(
       interpose export cmib --run runs/cmib --packs packs --out weights/cmib
 
     Args:
-        run: the folder of the training run.
-        packs: the folder with the packs that it was trained on.
         out: the folder for the weights.
-        splits: what it was trained on: train (the default), or train,validation.
     """
     with needs_torch("export a network"):
         from interpose.training.export import export_cmib
-    _export(export_cmib, run, packs, out, splits)
+    _export(export_cmib, of, out)
 
 
 @export.command
 def stmi_gan(
     *,
-    run: Path,
-    packs: Path = Path("packs"),
+    of: Of,
     out: Path = Path("weights/stmi-gan"),
-    splits: list[str] = [],  # noqa: B006
 ) -> None:
     """Write stmi-gan.onnx, its card stmi-gan.json, and the training log with its curves.
 
@@ -88,23 +91,18 @@ def stmi_gan(
       interpose export stmi-gan --run runs/stmi --packs packs --out weights/stmi-gan
 
     Args:
-        run: the folder of the training run.
-        packs: the folder with the packs that it was trained on.
         out: the folder for the weights.
-        splits: what it was trained on: train (the default), or train,validation.
     """
     with needs_torch("export a network"):
         from interpose.training.export import export_stmi_gan
-    _export(export_stmi_gan, run, packs, out, splits)
+    _export(export_stmi_gan, of, out)
 
 
 @export.command
 def seq2seq(
     *,
-    run: Path,
-    packs: Path = Path("packs"),
+    of: Of,
     out: Path,
-    splits: list[str] = [],  # noqa: B006
 ) -> None:
     """Write seq2seq.onnx, its card seq2seq.json, and the training log: a row of bench forecasting.
 
@@ -113,21 +111,18 @@ def seq2seq(
       interpose bench forecasting --weights runs/seq2seq/weights
 
     Args:
-        run: the folder of the training run.
-        packs: the folder with the packs that it was trained on.
         out: the folder for the weights.
-        splits: what it was trained on: train (the default), or train,validation.
     """
     with needs_torch("export a network"):
         from interpose.training.export import export_seq2seq
-    _export(export_seq2seq, run, packs, out, splits)
+    _export(export_seq2seq, of, out)
 
 
-def _export(write: Callable[..., Any], run: Path, packs: Path, out: Path, splits: list[str]) -> None:
+def _export(write: Callable[..., Any], of: Of, out: Path) -> None:
     """Export a run as its verb was told."""
-    chosen = check_splits(splits)
+    chosen = check_splits(of.splits)
     for name in ("averaged.pt", "log.jsonl", "settings.json"):
-        if not (run / name).is_file():
-            raise FileError(f"cannot export {run}", f"it has no {name}", "Train first: interpose train.")
-    card = write(run, load_packs(packs), out, list(chosen))
+        if not (of.run / name).is_file():
+            raise FileError(f"cannot export {of.run}", f"it has no {name}", "Train first: interpose train.")
+    card = write(of.run, load_packs(of.packs), out, list(chosen))
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from cyclopts import App
+from cyclopts import App, Parameter
 
 from interpose.cli.console import say
 from interpose.cli.reading import split_names
@@ -70,41 +70,46 @@ def change(settings: Any, changes: list[str]) -> Any:
     return replace(settings, **found)
 
 
-def _train(
-    recipe: Callable[..., Any],
-    settings: Any,
-    name: str,
-    packs: Path,
-    out: Path,
-    budget: str,
-    splits: list[str],
-    start: str | None,
-    changes: list[str],
-    shipped: bool = True,
-) -> None:
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Run:
+    """What all recipes are told."""
+
+    out: Annotated[Path, Parameter(help="the folder of the run: checkpoints and the log.")]
+    packs: Annotated[
+        Path, Parameter(help="the folder with the packs to train on: `interpose data pack` makes them.")
+    ] = Path("packs")
+    budget: Annotated[str, Parameter(help="device time or steps: 25m, 3h, 6000steps.")] = "25m"
+    splits: Annotated[
+        list[str],
+        Parameter(help="train (the default); train,validation for a final run of fixed budget."),
+    ] = field(default_factory=list)
+    start: Annotated[
+        str | None,
+        Parameter(help="go on from these installed weights, by name, instead of from nothing."),
+    ] = None
+    set: Annotated[
+        list[str],
+        Parameter(help="change a setting of the recipe, for studies: name=value. May be repeated."),
+    ] = field(default_factory=list)
+
+
+def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipped: bool = True) -> None:
     """Run a recipe as its verb was told. What is not shipped stays apart from the weights that users get."""
     from interpose.methods import weights
     from interpose.training.budget import Budget
 
-    changed, chosen = change(settings, changes), check_splits(splits)
-    begin = weights.card(start) if start else None
-    recipe(load_packs(packs), out, Budget.parse(budget), changed, splits=chosen, start=begin, say=say)
-    say(f"done: {out}")
+    changed, chosen = change(settings, run.set), check_splits(run.splits)
+    begin, budget = weights.card(run.start) if run.start else None, Budget.parse(run.budget)
+    recipe(load_packs(run.packs), run.out, budget, changed, splits=chosen, start=begin, say=say)
+    say(f"done: {run.out}")
     # So does a study.
-    there = Path("weights") / name if shipped and not changes else out / "weights"
-    say(f"Next: interpose export {name} --run {out} --packs {packs} --out {there}")
+    there = Path("weights") / name if shipped and not run.set else run.out / "weights"
+    say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}")
 
 
 @train.command
-def cae(
-    *,
-    packs: Path = Path("packs"),
-    out: Path,
-    budget: str = "25m",
-    splits: list[str] = [],  # noqa: B006
-    start: str | None = None,
-    set: list[str] = [],  # noqa: B006
-) -> None:
+def cae(*, run: Run) -> None:
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 
     The networks and losses that the paper compares with are settings of the same recipe.
@@ -114,58 +119,26 @@ def cae(
       interpose train cae --out runs/ours60 --set gap=30
       interpose train cae --out runs/vanilla --set network=vanilla --set gap=30
       interpose train cae --out runs/l2 --set loss=l2
-
-    Args:
-        packs: the folder with the packs to train on: `interpose data pack` makes them.
-        out: the folder of the run: checkpoints and the log.
-        budget: device time or steps: 25m, 3h, 6000steps.
-        splits: train (the default); train,validation for a final run of fixed budget.
-        start: go on from these installed weights, by name, instead of from nothing.
-        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
         from interpose.training.cae import CaeSettings, train_cae
-    _train(train_cae, CaeSettings(), "cae", packs, out, budget, splits, start, set)
+    _train(train_cae, CaeSettings(), "cae", run)
 
 
 @train.command
-def cmib(
-    *,
-    packs: Path = Path("packs"),
-    out: Path,
-    budget: str = "25m",
-    splits: list[str] = [],  # noqa: B006
-    start: str | None = None,
-    set: list[str] = [],  # noqa: B006
-) -> None:
+def cmib(*, run: Run) -> None:
     """Train CMIB, conditional motion in-betweening of Kim et al. An interrupted run goes on where it stopped.
 
     Try:
       interpose train cmib --packs packs --out runs/cmib --budget 25m
-
-    Args:
-        packs: the folder with the packs to train on: `interpose data pack` makes them.
-        out: the folder of the run: checkpoints and the log.
-        budget: device time or steps: 25m, 3h, 6000steps.
-        splits: train (the default); train,validation for a final run of fixed budget.
-        start: go on from these installed weights, by name, instead of from nothing.
-        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
         from interpose.training.cmib import CmibSettings, train_cmib
-    _train(train_cmib, CmibSettings(), "cmib", packs, out, budget, splits, start, set)
+    _train(train_cmib, CmibSettings(), "cmib", run)
 
 
 @train.command
-def stmi_gan(
-    *,
-    packs: Path = Path("packs"),
-    out: Path,
-    budget: str = "25m",
-    splits: list[str] = [],  # noqa: B006
-    start: str | None = None,
-    set: list[str] = [],  # noqa: B006
-) -> None:
+def stmi_gan(*, run: Run) -> None:
     """Train STMI-GAN of Hernandez Ruiz et al., on LAFAN1 and Bandai-Namco. An interrupted run goes on.
 
     The rows of the paper's tables are settings of the same recipe.
@@ -174,45 +147,21 @@ def stmi_gan(
       interpose train stmi-gan --packs packs --out runs/stmi --budget 25m
       interpose train stmi-gan --out runs/paper --set config=paper
       interpose train stmi-gan --out runs/nogan --set config=paper --set branches=none
-
-    Args:
-        packs: the folder with the packs to train on: `interpose data pack` makes them.
-        out: the folder of the run: checkpoints and the log.
-        budget: device time or steps: 25m, 3h, 6000steps.
-        splits: train (the default); train,validation for a final run of fixed budget.
-        start: go on from these installed weights, by name, instead of from nothing.
-        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
         from interpose.training.stmi_gan import StmiGanSettings, train_stmi_gan
-    _train(train_stmi_gan, StmiGanSettings(), "stmi-gan", packs, out, budget, splits, start, set)
+    _train(train_stmi_gan, StmiGanSettings(), "stmi-gan", run)
 
 
 @train.command
-def seq2seq(
-    *,
-    packs: Path = Path("packs"),
-    out: Path,
-    budget: str = "25m",
-    splits: list[str] = [],  # noqa: B006
-    start: str | None = None,
-    set: list[str] = [],  # noqa: B006
-) -> None:
+def seq2seq(*, run: Run) -> None:
     """Train the residual sequence-to-sequence network of Martinez et al., a row of bench forecasting.
 
     On LAFAN1 and Bandai-Namco, with their labels. An interrupted run goes on where it stopped.
 
     Try:
       interpose train seq2seq --packs packs --out runs/seq2seq --budget 25m
-
-    Args:
-        packs: the folder with the packs to train on: `interpose data pack` makes them.
-        out: the folder of the run: checkpoints and the log.
-        budget: device time or steps: 25m, 3h, 6000steps.
-        splits: train (the default); train,validation for a final run of fixed budget.
-        start: go on from these installed weights, by name, instead of from nothing.
-        set: change a setting of the recipe, for studies: name=value. May be repeated.
     """
     with needs_torch("train a network"):
         from interpose.training.seq2seq import Seq2SeqSettings, train_seq2seq
-    _train(train_seq2seq, Seq2SeqSettings(), "seq2seq", packs, out, budget, splits, start, set, shipped=False)
+    _train(train_seq2seq, Seq2SeqSettings(), "seq2seq", run, shipped=False)
