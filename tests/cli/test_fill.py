@@ -221,6 +221,23 @@ def test_joints_in_a_range_and_in_the_whole_clip(run, take):
     assert whole.json["gaps"][0]["frames"] == "0:163"
 
 
+def test_recover_finds_nothing_in_a_clean_clip(run, take):
+    clip = load(Path("take.bvh")).slice(0, 9)
+    save(clip, Path("clean.bvh"))
+    done = run("recover", "clean.bvh")
+    assert done.code == 2
+    assert "interpose scan" in done.err
+    assert not Path("clean.recovered.bvh").exists()
+
+
+def test_joints_of_which_nothing_is_known_are_flagged_where_only_the_rest_pose_is_left(run, take):
+    assert (
+        "has only the rest pose"
+        in run("recover", "take.bvh", "--joints", "LeftArm", "--method", "spline").out
+    )
+    assert "rest pose" not in run("recover", "take.bvh", "--joints", "LeftArm", "--force").out
+
+
 def test_recover_without_joints_finds_what_was_lost_for_moments(run, take):
     clip = load(Path("take.bvh"))
     elbow, rotation = clip.skeleton.index("LeftForeArm"), clip.rotation.copy()
@@ -230,6 +247,7 @@ def test_recover_without_joints_finds_what_was_lost_for_moments(run, take):
     done = run("recover", "lost.bvh", "--player")
     assert done.code == 0
     assert "lost for moments and interpolated: 1" in done.out
+    assert "LeftForeArm: 10:11, 17:18" in done.out
     moments = json.loads(Path("lost.recovered.json").read_text())["moments"]
     (elbow,) = (one["frames"] for one in moments if one["joint"] == "LeftForeArm")
     assert elbow == [f"{frame}:{frame + 1}" for frame in range(10, 80, 7)]

@@ -528,14 +528,14 @@ def forecasting(
     """Hernandez Ruiz et al. 2019, table 1: do forecasts of 4 s move as people do?
 
     Entropies of power spectra, and how far these are from real motion's, second by
-    second; distances to the truth, and diversity. The installed weights of STMI-GAN
-    are a row, and so are those of each folder named.
+    second; distances to the truth, and diversity. Weights of STMI-GAN are a row where
+    they are installed, and so are those of each folder named.
 
     Try:
       interpose bench forecasting --data data --split test
       interpose train seq2seq --out runs/seq2seq
       interpose export seq2seq --run runs/seq2seq --out runs/seq2seq/weights
-      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/a
+      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/stmi/weights
 
     Args:
         weights: a folder that `interpose export` wrote of stmi-gan or seq2seq; may be repeated.

@@ -221,13 +221,16 @@ def write(
 
 def compare(clip: Clip, completion: Completion, title: str) -> str:
     """A page that plays the clip as it was, faintly, and as it is now; once, if that is all there is."""
+    from interpose.observation import Gap
     from interpose.show import Take, player
 
     done = "filled" if completion.report.noise is None else "denoised"
     takes = [Take(done, completion.clip.positions(), "#d1495b")]
     if clip is not completion.clip:
         takes.append(Take("input", clip.positions(), "#6b7280", ghost=True))
-    gaps = completion.report.gaps
+    report = completion.report
+    brief = [Gap.parse(at, (one.joint,)) for one in report.moments for at in one.frames]
+    gaps = [*report.gaps, *brief]
     text, names_ = str(completion.report), clip.skeleton.names
     return player(takes, clip.skeleton.parents, clip.fps, gaps, title=title, report=text, names=names_)
 
@@ -235,8 +238,11 @@ def compare(clip: Clip, completion: Completion, title: str) -> str:
 def print_report(completion: Completion, fps: float, why: dict[int, str]) -> None:
     """A line for each gap, then what is to be said about single ones, then what stayed open."""
     gaps, report = completion.report.gaps, completion.report
-    if report.moments or not (gaps or report.open):
-        say(report.momentary or "nothing is missing")
+    if report.moments:
+        say(report.momentary)
+        for one in report.moments:
+            more = f" +{len(one.frames) - 8}" if len(one.frames) > 8 else ""
+            say(f"  {one.joint}: {', '.join(one.frames[:8])}{more}", style="dim")
         if not gaps:
             return
     say_table(

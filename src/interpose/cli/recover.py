@@ -27,7 +27,10 @@ def recover(
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
 ) -> int:
-    """Recover joints that are missing in the whole clip or in a range.
+    """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
+
+    Without --joints it finds what drops out: joints that snap to their rest pose for up to
+    a second, and spikes, at any frames. `interpose scan` finds longer losses.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -39,8 +42,7 @@ def recover(
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        joints: the joints, separated by commas. Without any, what was lost is found: joints
-            that snap to their rest pose and spikes, at any frames.
+        joints: the joints, separated by commas; without any, those that drop out.
         frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
         output: where to write the clip; the report goes beside it.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
@@ -68,4 +70,10 @@ def recover(
     outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
+    if not (done.report.gaps or done.report.moments):
+        raise RequestError(
+            f"there is nothing to recover in {file}",
+            "no joint snaps to its rest pose for up to a second, and none spikes",
+            "Longer losses: interpose scan finds them, and --joints LeftArm names them.",
+        )
     return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)

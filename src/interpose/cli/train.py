@@ -139,14 +139,14 @@ def cmib(*, run: Run) -> None:
 
 @train.command
 def stmi_gan(*, run: Run) -> None:
-    """Train STMI-GAN of Hernandez Ruiz et al., on LAFAN1 and Bandai-Namco. An interrupted run goes on.
+    """Train STMI-GAN of Hernandez Ruiz et al. An interrupted run goes on where it stopped.
 
-    The rows of the paper's tables are settings of the same recipe.
+    On LAFAN1 and Bandai-Namco. The rows of the paper's tables are settings of the recipe.
 
     Try:
       interpose train stmi-gan --packs packs --out runs/stmi --budget 25m
       interpose train stmi-gan --out runs/paper --set config=paper
-      interpose train stmi-gan --out runs/nogan --set config=paper --set branches=none
+      interpose train stmi-gan --out runs/nogan --set branches=none
     """
     with needs_torch("train a network"):
         from interpose.training.stmi_gan import StmiGanSettings, train_stmi_gan

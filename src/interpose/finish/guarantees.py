@@ -35,6 +35,8 @@ DULL = 0.33
 # of the gap (Kaufmann et al. 2020, section 4.2: a sixth, for walks). Errors of validation performers are then
 # within 10 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
 BESIDE, SHARE = 0.25, 1 / 6
+# A share of all joints: so many laid on a body are most of it.
+MOST = 0.5
 # A path on which the root goes this much further than without it is said to be too long.
 FURTHER = 1.5
 # Frames solved at once.
@@ -124,8 +126,10 @@ def complete(
     if hanging.any() and not isinstance(method, Layer):
         body = complete(clip, without(observation, hanging), method, seed, fallback, limit, first=first)
         layer = Layer(method.name, body.clip, body.raw, hanging)
-        # Where what is laid on it jumps, another body would not help: it is said, and this one kept.
-        return _told_of(body, complete(clip, observation, layer, seed, layer, limit, first=first))
+        # Where some joints that are laid on a body jump, another body would not help: it is said, and this
+        # one kept. Where most of them are, it is rather the body that does not fit.
+        simpler: Method = layer if hanging.any(axis=0).mean() < MOST else fallback
+        return _told_of(body, complete(clip, observation, layer, seed, simpler, limit, first=first))
     gaps = known.gaps(clip.skeleton)
     if not gaps:
         return Completion(
@@ -135,7 +139,8 @@ def complete(
     spans = [_Span(start, stop, method.name) for start, stop in runs(~known.frames)]
     for gap in gaps:
         if reason := method.refuses(hidden, gap):
-            _of(spans, gap).problem = f"{method.name} refuses {gap}: {reason}"
+            there = replace(gap, start=gap.start + first, stop=gap.stop + first)
+            _of(spans, gap).problem = f"{method.name} refuses {there}: {reason}"
     if all(span.problem for span in spans):
         raw = _second(fallback, hidden, observation, gaps, seed)
     else:
@@ -521,6 +526,7 @@ def _report(
     alive = None if gap.joints is not None else _liveliness(finished, gap)
     networks = gap.joints is None and "model" in raw.notes
     scant = _scant(known, gap, finished.fps) if networks else None
+    never = [] if own and "model" in raw.notes else _never(known, gap, skeleton.names)
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
@@ -547,6 +553,7 @@ def _report(
             *((inside[1],) if inside and inside[1] else ()),
             *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
             *((scant,) if scant else ()),
+            *((_rests(never, span.method),) if never else ()),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
     )
@@ -564,6 +571,19 @@ def _dull(alive: float, gap: Gap, first: int) -> str:
     return (
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
         f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
+    )
+
+
+def _never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:
+    """The joints of a gap of which nothing is known at any frame."""
+    return [name for name in gap.joints or () if not known.rotation[:, names.index(name)].any()]
+
+
+def _rests(never: list[str], method: str) -> str:
+    named = ", ".join(never[:4]) + f" +{len(never) - 4}" * (len(never) > 4)
+    return (
+        f"flagged: nothing of {named} is known at any frame, and {method} has only the rest pose to say. "
+        "--method cae tells it from the other joints"
     )
 
 

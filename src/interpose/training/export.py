@@ -170,7 +170,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     card = Card(
         name=name,
         method="cae",
-        description=f"{DESCRIPTIONS[name]}, gaps to {longest / 30:g} s",
+        description=f"{DESCRIPTIONS[name]}, trained on gaps to {longest / 30:g} s",
         licence=_licence(packs),
         data=_data(packs, splits),
         tasks=["fill", "recover"],
