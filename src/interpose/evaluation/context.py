@@ -164,7 +164,7 @@ class Context:
             [
                 f"Finished fills, {self.split} performers: mean joint error in cm (ratio to linear) by "
                 f"length of gap, {CONTEXT / FPS:.2f} s known on either side, {self.windows()} windows. The "
-                "network `cae` is asked here beyond the gaps that it was made for, too; `auto` never does.",
+                "network `cae` learned gaps of up to 2 s.",
                 self.gap_table(),
                 "How much the middle of the gap moves, as a share of the truth (in how many windows so "
                 "little that a report speaks of a mean pose).",
