@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 from cyclopts import App, Parameter
 
 from interpose.cli.console import console, say, say_json
-from interpose.cli.research import needs_torch
+from interpose.cli.research import needs_torch, shown
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -50,7 +50,11 @@ class Result(Protocol):
     def to_dict(self) -> dict[str, Any]: ...
 
 
-bench = App(name="bench", help="Measure how good the methods are, by published protocols.")
+bench = App(
+    name="bench",
+    help="Measure how good the methods are, by published protocols.",
+    default_parameter=Parameter(show_default=shown),
+)
 
 
 @bench.command
@@ -114,14 +118,14 @@ def noise(
 ) -> None:
     """Kaufmann et al. 2020, table 2, as in the paper: joint error of networks on noise and lost joints.
 
-    The installed network and others, alone, on positions of no skeleton; needs PyTorch.
+    The installed network and others, alone, on positions of no skeleton (needs PyTorch).
     What denoising does for users is measured by interpose bench denoise.
 
     Try:
       interpose bench noise --data data --split test
       interpose train cae --out runs/noise --set noise=0.3
       interpose export cae --run runs/noise --out runs/noise/weights
-      interpose bench noise --weights runs/noise/weights --weights runs/holden/weights
+      interpose bench noise --weights runs/noise/weights
 
     Args:
         weights: a folder that `interpose export cae` wrote, to compare with; may be repeated.
@@ -415,8 +419,8 @@ def human(
     other. Each person saves a file; with --votes these are counted.
 
     Try:
-      interpose bench human --real clips/recorded --generated clips/stmi-gan --survey survey
-      interpose bench human --survey survey --votes votes-ana.json --votes votes-ben.json
+      interpose bench human --real clips/recorded --generated clips/stmi-gan
+      interpose bench human --votes votes-ana.json --votes votes-ben.json
 
     Args:
         real: a folder of recorded clips.
@@ -528,14 +532,14 @@ def forecasting(
     """Hernandez Ruiz et al. 2019, table 1: do forecasts of 4 s move as people do?
 
     Entropies of power spectra, and how far these are from real motion's, second by
-    second; distances to the truth, and diversity. Weights of STMI-GAN are a row where
-    they are installed, and so are those of each folder named.
+    second; distances to the truth, and diversity. Weights of STMI-GAN are a row
+    where they are installed, and so are those of each folder named.
 
     Try:
       interpose bench forecasting --data data --split test
       interpose train seq2seq --out runs/seq2seq
       interpose export seq2seq --run runs/seq2seq --out runs/seq2seq/weights
-      interpose bench forecasting --weights runs/seq2seq/weights --weights runs/stmi/weights
+      interpose bench forecasting --weights runs/seq2seq/weights
 
     Args:
         weights: a folder that `interpose export` wrote of stmi-gan or seq2seq; may be repeated.

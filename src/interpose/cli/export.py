@@ -10,11 +10,15 @@ from typing import Annotated, Any
 from cyclopts import App, Parameter
 
 from interpose.cli.console import say
-from interpose.cli.research import needs_torch
+from interpose.cli.research import needs_torch, shown
 from interpose.cli.train import check_splits, load_packs
 from interpose.errors import FileError
 
-export = App(name="export", help="Turn a training run into weights with a card (needs PyTorch).")
+export = App(
+    name="export",
+    help="Turn a training run into weights with a card (needs PyTorch).",
+    default_parameter=Parameter(show_default=shown),
+)
 
 
 @Parameter(name="*")

@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from interpose.errors import RequestError
+
+
+def shown(default: Any) -> str | None:
+    """How help shows a default; not at all where it is off, or nothing."""
+    return None if default is None or default is False or default == [] else str(default)
 
 
 @contextmanager

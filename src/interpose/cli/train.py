@@ -11,13 +11,17 @@ from cyclopts import App, Parameter
 
 from interpose.cli.console import say
 from interpose.cli.reading import split_names
-from interpose.cli.research import needs_torch
+from interpose.cli.research import needs_torch, shown
 from interpose.errors import FileError, RequestError, unknown
 
 if TYPE_CHECKING:
     from interpose.datasets import Pack
 
-train = App(name="train", help="Train a network (needs PyTorch: pip install 'interpose[train]').")
+train = App(
+    name="train",
+    help="Train a network (needs PyTorch: pip install 'interpose[train]').",
+    default_parameter=Parameter(show_default=shown),
+)
 SPLITS = ("train", "validation")
 
 
