@@ -202,3 +202,10 @@ def test_data_that_is_not_there(run, tmp_path):
 def test_json_is_the_only_output(run, take):
     json.loads(run("scan", "take.bvh", "--json").out)
     json.loads(run("data", "info", "--json").out)
+
+
+def test_a_method_without_weights_has_no_card_but_an_answer(run):
+    done = run("models", "spline")
+    assert done.code == 0
+    assert "no trained weights" in done.out
+    assert run("models", "cubic").code == 2

@@ -25,11 +25,20 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
       interpose models cae
 
     Args:
-        name: of a model: prints its whole card: training data, licence, limits, measured figures.
+        name: of a model, whose whole card is printed: training data, licence, limits, measured
+            figures; or of a method without one.
         json: print JSON for other programs.
     """
     from interpose.methods import registry, weights
 
+    names = dict.fromkeys(["auto", *registry.names()])
+    if name in names and name not in [card.name for card in weights.cards()]:
+        what = METHODS.get(name, "from another package")
+        if json:
+            say_json({"name": name, "description": what})
+        else:
+            say(f"{name}: {what}\nIt has no trained weights, and so no card.")
+        return
     if name is not None:
         card = weights.card(name).to_dict()
         if json:
@@ -38,7 +47,6 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
             say("\n".join(_lines(card)))
         return
     cards = weights.cards()
-    names = dict.fromkeys(["auto", *registry.names()])
     if json:
         methods = [{"name": one, "description": METHODS.get(one, "from another package")} for one in names]
         say_json({"methods": methods, "models": [card.to_dict() for card in cards]})
