@@ -32,7 +32,8 @@ class _Deconvolution(torch.autograd.Function):
     def forward(ctx: Any, x: Tensor, weight: Tensor, stride: tuple[int, ...], size: list[int]) -> Tensor:
         ctx.save_for_backward(x, weight)
         ctx.stride = stride
-        like = torch.empty((len(x), weight.shape[1], *size), dtype=x.dtype)
+        # Its values are not asked for; no numbers that happen to lie in memory must get into anything.
+        like = torch.zeros((len(x), weight.shape[1], *size), dtype=x.dtype)
         like = like.to(memory_format=torch.channels_last)
         return _gradients(x, like, weight, stride, [True, False, False])[0]
 
