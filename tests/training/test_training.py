@@ -29,6 +29,7 @@ from interpose.training.cae import (  # noqa: E402
     predict_disturbed,
     train_cae,
 )
+from interpose.training.deconvolution import quicken  # noqa: E402
 from interpose.training.export import export_cae  # noqa: E402
 from interpose.training.windows import Windows  # noqa: E402
 
@@ -265,3 +266,20 @@ def test_a_run_from_shipped_weights_begins_with_them_and_keeps_their_history(pac
     assert new.auto == card.auto, "thresholds stay as measured on performers that were held out then"
     log = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
     assert [entry["step"] for entry in log] == sorted(entry["step"] for entry in log)
+
+
+def test_gradients_of_narrow_deconvolutions_do_not_depend_on_what_lies_in_memory():
+    """With images of two columns torch's own strided convolution in bfloat16 reads what it should not."""
+    torch.manual_seed(0)
+    layer = torch.nn.ConvTranspose2d(64, 64, 3, 2, 1, 1)
+    x, found = torch.randn(4, 64, 5, 1), []
+    for quick in (False, True):
+        image = x.clone().requires_grad_()
+        if quick:
+            quicken(torch.nn.Sequential(layer))
+        junk = [torch.full((2**n,), float("nan"), dtype=torch.bfloat16) for n in range(4, 21)]
+        del junk
+        with torch.autocast("cpu", torch.bfloat16, enabled=quick):
+            layer(image).float().square().mean().backward()
+        found.append(image.grad)
+    assert torch.allclose(found[0], found[1], atol=0.02 * float(found[0].abs().max()))
