@@ -26,11 +26,13 @@ SMALL = StmiGanConfig(frames=20, width=40, gates=1, blocks=2, channels=(4, 6))
 def generator():  # type: ignore[no-untyped-def]
     torch.manual_seed(0)
     model = Generator(SMALL).double().eval()
-    # As if noise had been learned.
+    # As if it had been trained: noise is injected, and blocks say something.
     with torch.no_grad():
         for name, value in model.named_parameters():
             if name.endswith("scale"):
                 value.fill_(0.3)
+            elif name.endswith("flat.weight"):
+                value.normal_(std=0.3)
     return model
 
 
@@ -49,7 +51,7 @@ def forecast(motion):  # type: ignore[no-untyped-def]
 
 def noise(model, batch=1, scale=1.0):  # type: ignore[no-untyped-def]
     config = model.config
-    made = np.random.default_rng(1).standard_normal((batch, model.noises, config.frames, config.width))
+    made = np.random.default_rng(1).standard_normal((batch, model.noises, config.rows, config.width))
     return torch.from_numpy(scale * made)
 
 
@@ -107,6 +109,18 @@ def test_a_new_network_injects_no_noise(motion, forecast):
     model = Generator(SMALL).double()
     one, other = (model(motion, forecast, noise(model, scale=s))[0] for s in (0.0, 1.0))
     assert torch.equal(one, other)
+
+
+@pytest.mark.parametrize("config", [PAPER, DENSE], ids=["paper", "dense"])
+def test_a_new_network_says_what_it_knows(config):
+    """Of frames that are whole, and of single coordinates: the rest is near the mean."""
+    model = Generator(config)
+    with torch.no_grad():
+        x = torch.randn(4, config.frames, 22, 3)
+        known = torch.rand(x.shape) < 0.7
+        said = model.aligned(x, known, noise(model, batch=4).float())
+    given = torch.where(known, x, 0.0)
+    assert np.corrcoef(said.flatten(), given.flatten())[0, 1] > 0.85
 
 
 @pytest.mark.parametrize("config", [PAPER, DENSE], ids=["paper", "dense"])

@@ -119,7 +119,7 @@ def test_settings_that_are_none(changes):
 
 def test_a_run_learns_stops_and_goes_on(pack, tmp_path, monkeypatch):
     """The discriminator and its optimiser are kept, too; what comes out is a graph that says the same."""
-    tiny = stmi_gan.replace(PAPER, width=32, gates=1, blocks=1, channels=(4, 6))
+    tiny = stmi_gan.replace(PAPER, together=2, width=32, gates=1, blocks=1, channels=(4, 6))
     monkeypatch.setitem(stmi_gan.CONFIGS, "paper", tiny)
     settings = StmiGanSettings(config="paper", batch=4, every_seconds=0.0)
     told: list[str] = []
@@ -141,7 +141,7 @@ def test_a_run_learns_stops_and_goes_on(pack, tmp_path, monkeypatch):
     observed = rng.random((2, 20, 22, 3)) < 0.7
     observed[:, 0] = True
     raw, completed = run(card, positions, observed)
-    still = torch.zeros(2, model.noises, 20, 32)
+    still = torch.zeros(2, model.noises, 10, 32)
     with torch.no_grad():
         for value in model.parameters():
             if value.numel() >= 1024:  # stored in 16 bits

@@ -30,7 +30,8 @@ class StmiGanConfig:
     Attributes:
         frames: of a window.
         fps: at which it thinks; 20 frames of 4 s in the paper.
-        width: values that a frame is encoded into, four for each coordinate in the paper.
+        together: frames, one after the other, that are encoded into one; one in the paper.
+        width: values that these are encoded into, four for each coordinate of a frame in the paper.
         gates: gated blocks of the frame encoder, and of the decoder.
         blocks: U-blocks one after the other.
         channels: of the levels of a U-block, each half as large as the one before.
@@ -39,17 +40,24 @@ class StmiGanConfig:
 
     frames: int = 20
     fps: float = 5.0
+    together: int = 1
     width: int = 4 * VALUES
     gates: int = 3
     blocks: int = 4
     channels: tuple[int, ...] = (32, 64, 96)
     branches: tuple[str, ...] = BRANCHES
 
+    @property
+    def rows(self) -> int:
+        """Rows of the image that a motion is written as."""
+        return self.frames // self.together
+
 
 PAPER = StmiGanConfig()
-# For users: 4 s at 30 fps, frame by frame, so with more levels to see as much time; a narrower code, as the
-# time that a window takes is what they wait for.
-DENSE = StmiGanConfig(frames=120, fps=30.0, width=128, channels=(16, 32, 64, 96, 96))
+# For users: 4 s at 30 fps, with one more level to see as much time. At that rate a frame says little that the
+# one before it does not: four are encoded into as many values as they have coordinates, which takes a third of
+# the time of an image with a row for each.
+DENSE = StmiGanConfig(frames=120, fps=30.0, together=4, channels=(32, 64, 96, 96))
 CONFIGS = {"paper": PAPER, "dense": DENSE}
 
 
@@ -61,6 +69,8 @@ class Gated(nn.Module):
         self.first = nn.Linear(width, width // 2)
         self.second = nn.Linear(width // 2, width)
         self.gate = nn.Linear(width, width)
+        # At the start almost everything passes as it is (Srivastava 2015), else six blocks forget the input.
+        nn.init.constant_(self.gate.bias, -3.0)
 
     def forward(self, x: Tensor) -> Tensor:
         share = torch.sigmoid(self.gate(x))
@@ -68,10 +78,10 @@ class Gated(nn.Module):
 
 
 class FrameNetwork(nn.Sequential):
-    """Each frame by itself: (..., into) to (..., out), through gated blocks `width` wide."""
+    """Each frame, or few together, by itself: (..., into) to (..., out), through gated blocks `width` wide."""
 
-    def __init__(self, into: int, width: int, gates: int, out: int) -> None:
-        last = [] if out == width else [nn.Linear(width, out)]
+    def __init__(self, into: int, width: int, gates: int, out: int | None = None) -> None:
+        last = [] if out is None else [nn.Linear(width, out)]
         super().__init__(nn.Linear(into, width), *(Gated(width) for _ in range(gates)), *last)
 
 
@@ -101,6 +111,8 @@ class UBlock(nn.Module):
         )
         self.noises = nn.ModuleList(Noise(n) for n in (*into, *(m.in_channels for m in self.up)))
         self.flat = nn.Conv2d(2 * channels[0], 1, 1)
+        nn.init.zeros_(self.flat.weight)
+        nn.init.zeros_(self.flat.bias)
 
     def forward(self, image: Tensor, noise: Tensor) -> Tensor:
         """image: (B, 1, T, H); noise: (B, 2 * levels, T, H)."""
@@ -202,12 +214,30 @@ class Generator(nn.Module):
     def __init__(self, config: StmiGanConfig = PAPER) -> None:
         super().__init__()
         self.config = config
-        self.encoder = FrameNetwork(2 * VALUES, config.width, config.gates, config.width)
+        values = config.together * VALUES
+        self.encoder = FrameNetwork(2 * values, config.width, config.gates)
         self.blocks = nn.ModuleList(UBlock(config.channels) for _ in range(config.blocks))
-        self.decoder = FrameNetwork(config.width, config.width, config.gates, VALUES)
+        self.decoder = FrameNetwork(config.width, config.width, config.gates, values)
+        self._begin()
         # One for each axis, as in the public code.
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
+
+    def _begin(self) -> None:
+        """At the start the network writes frames as they are and reads back what it wrote.
+
+        So it says of what is known what it knows and of the rest the mean, and has only the rest to learn.
+        """
+        write, copy, read = self.encoder[0], self.decoder[0], self.decoder[-1]
+        assert all(isinstance(layer, nn.Linear) for layer in (write, copy, read))
+        with torch.no_grad():
+            # (together, coordinates or whether they are known, ...) is how the input is laid out.
+            into = write.weight.unflatten(1, (self.config.together, 2, VALUES))[:, :, 0]
+            into.copy_(nn.init.orthogonal_(torch.empty_like(read.weight.T)).view_as(into))
+            read.weight.copy_(into.flatten(1).T)
+            nn.init.eye_(copy.weight)
+            for layer in (write, copy, read):
+                nn.init.zeros_(layer.bias)
 
     @property
     def noises(self) -> int:
@@ -217,10 +247,13 @@ class Generator(nn.Module):
     def aligned(self, motion: Tensor, observed: Tensor, noise: Tensor) -> Tensor:
         """The same as `forward` on motions that are aligned already."""
         x = torch.where(observed, (motion - self.mean) / self.std, 0.0)
-        image = self.encoder(torch.cat([x.flatten(2), observed.flatten(2).to(x.dtype)], dim=2))[:, None]
+        given = torch.cat([x.flatten(2), observed.flatten(2).to(x.dtype)], dim=2)
+        layout = (self.config.rows, self.config.together)
+        image = self.encoder(given.unflatten(1, layout).flatten(2))[:, None]
         for block, part in zip(self.blocks, noise.chunk(self.config.blocks, dim=1)):
             image = block(image, part)
-        answer = self.decoder(image[:, 0]).unflatten(2, (len(JOINTS), 3))
+        said = self.decoder(image[:, 0])
+        answer = said.unflatten(2, (self.config.together, len(JOINTS), 3)).flatten(1, 2)
         return answer * self.std + self.mean
 
     def forward(self, positions: Tensor, observed: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
@@ -230,7 +263,7 @@ class Generator(nn.Module):
             positions: (B, T, 22, 3).
             observed: (B, T, 22, 3) booleans. Where a joint's x is known without its z, or the other way
                 round, the first pose should face along Z: the axes of the alignment are the world's then.
-            noise: (B, noises, T, width) standard normal; 0 for the most likely answer.
+            noise: (B, noises, rows, width) standard normal; 0 for the most likely answer.
 
         Returns:
             (B, T, 22, 3) the network's own motion, also where it is observed; and the same settled into the
@@ -252,15 +285,17 @@ def distances(motion: Tensor) -> Tensor:
 
 
 class Residual(nn.Module):
-    """A residual CNN that tells features of an image (B, 1, T, H): (B, 3 * `features`).
+    """A residual CNN that tells features of an image (B, C, T, H): (B, 3 * `features`).
 
     Blocks of two convolutions and a shortcut, each halving the image; what each says, averaged over time,
     is transformed and put beside the others' (section 6).
     """
 
-    def __init__(self, height: int, channels: tuple[int, ...] = (32, 64, 96), features: int = 64) -> None:
+    def __init__(
+        self, colours: int, height: int, channels: tuple[int, ...] = (32, 64, 96), features: int = 64
+    ) -> None:
         super().__init__()
-        into = (1, *channels[:-1])
+        into = (colours, *channels[:-1])
         self.first = nn.ModuleList(nn.Conv2d(a, b, 3, 2, 1) for a, b in zip(into, channels))
         self.second = nn.ModuleList(nn.Conv2d(b, b, 3, 1, 1) for b in channels)
         self.short = nn.ModuleList(nn.Conv2d(a, b, 1, 2) for a, b in zip(into, channels))
@@ -295,8 +330,10 @@ class Discriminator(nn.Module):
         super().__init__()
         self.config = config
         heights = {"base": config.width, "edm": len(ENDS), "motion": VALUES + len(ENDS)}
-        self.encoder = FrameNetwork(VALUES, config.width, config.gates, config.width)
-        self.branches = nn.ModuleDict({name: Residual(heights[name]) for name in config.branches})
+        self.encoder = FrameNetwork(VALUES, config.width, config.gates)
+        self.branches = nn.ModuleDict(
+            {name: Residual(config.together, heights[name]) for name in config.branches}
+        )
         self.score = nn.Linear(3 * 64 * max(len(config.branches), 1), 1)
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
@@ -316,9 +353,15 @@ class Discriminator(nn.Module):
         }
         return {name: found[name] for name in self.config.branches}
 
+    def image(self, rows: Tensor) -> Tensor:
+        """What is seen of frames (B, T or T - 1, H), those that go together as colours: (B, C, rows, H)."""
+        missing = self.config.frames - rows.shape[1]
+        padded = functional.pad(rows, (0, 0, 0, missing))
+        return padded.unflatten(1, (self.config.rows, self.config.together)).transpose(1, 2)
+
     def forward(self, seen: dict[str, Tensor]) -> Tensor:
         said = [
-            branch((self.encoder(seen[name]) if name == "base" else seen[name])[:, None])
+            branch(self.image(self.encoder(seen[name]) if name == "base" else seen[name]))
             for name, branch in self.branches.items()
         ]
         return self.score(torch.cat(said, dim=1))[:, 0]

@@ -69,7 +69,7 @@ def export_cmib_onnx(model: Cmib, path: Path) -> None:
 def export_stmi_gan_onnx(model: Generator, path: Path) -> None:
     """Write STMI-GAN's generator as one graph, for any number of motions of its own length."""
     shape = (2, model.config.frames, len(JOINTS), 3)
-    noise = torch.zeros(2, model.noises, model.config.frames, model.config.width)
+    noise = torch.zeros(2, model.noises, model.config.rows, model.config.width)
     clips = {0: _sizes(shape[1])[0]}
     inputs = {
         "positions": (torch.randn(shape), clips),

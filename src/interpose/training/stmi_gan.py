@@ -225,7 +225,7 @@ class Game:
 def noise(generator: Generator, batch: int, device: torch.device) -> Tensor:
     """Noise for a batch, standard normal."""
     config = generator.config
-    return torch.randn(batch, generator.noises, config.frames, config.width, device=device)
+    return torch.randn(batch, generator.noises, config.rows, config.width, device=device)
 
 
 @torch.no_grad()
@@ -310,7 +310,7 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
     observed = torch.ones_like(truth, dtype=torch.bool)
     half = frames // 2
     observed[:, half:] = False
-    still = truth.new_zeros(len(truth), model.noises, frames, model.config.width)
+    still = truth.new_zeros(len(truth), model.noises, model.config.rows, model.config.width)
     parts = (slice(at, at + 16) for at in range(0, len(truth), 16))
     made = torch.cat([model(truth[part], observed[part], still[part])[0] for part in parts])
     off = 100 * (made - truth).norm(dim=-1)
