@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from interpose.methods.registry import names as method_names
     from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.scan import scan
-    from interpose.tasks import Stitched
+    from interpose.tasks import Forecast, Stitched
 
 __version__ = "0.1.0"
 
@@ -45,6 +45,7 @@ __all__ = [
     "between",
     "denoise",
     "fill",
+    "forecast",
     "load",
     "method_names",
     "recover",
@@ -238,6 +239,41 @@ def between(
     from interpose import tasks
 
     return tasks.between(_clip(clip), keys, action, method, seed, progress)
+
+
+def forecast(
+    clip: Clip | str | Path,
+    frames: int | None = None,
+    *,
+    samples: int = 1,
+    method: str = "auto",
+    seed: int | None = None,
+    temperature: float = 1.0,
+    progress: Callable[[float], None] | None = None,
+) -> Forecast:
+    """Go on with a clip, from its last pose and where that is; the clip itself comes back unchanged.
+
+    Args:
+        clip: a clip, or the path of one. Two seconds of it or more tell best how it goes on.
+        frames: how many are added, at the clip's own rate; 2 s of them without it.
+        samples: in how many ways; each has a seed of its own, counted up from `seed` or from 1.
+        method: one of `method_names()`, or "auto".
+        seed: of what is drawn at random. A single sample without a seed is the most likely one.
+        temperature: how much is drawn at random, 0 to 10; 1 is what the network was trained with.
+        progress: called with the share done, 0 to 1.
+
+    Returns:
+        What `fill` does: `.clip` is the whole clip with its forecast, which begins at `.start`. `.samples`
+        lists all of them, and `.spread()` tells how far they lie apart in each new frame, in cm.
+
+    Raises:
+        RequestError: no frame or sample asked for, several samples of a method that has one answer, and what
+            `fill` refuses.
+        FileError: the file cannot be read.
+    """
+    from interpose import tasks
+
+    return tasks.forecast(_clip(clip), frames, samples, method, seed, temperature, progress)
 
 
 def stitch(

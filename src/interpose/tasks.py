@@ -25,7 +25,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods import auto, registry
 from interpose.methods.classical import Spline
-from interpose.methods.protocol import Method, Raw
+from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, timeline
 from interpose.observation.broken import broken
 from interpose.observation.part import lay
@@ -35,6 +35,9 @@ CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
+AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
+FURTHEST = 600.0  # seconds that a forecast goes on for at most
+HOTTEST = 10.0  # times the noise of the training that may be injected
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
 
@@ -60,6 +63,7 @@ def fill(
     action: str = "",
     parts: Sequence[Part] = (),
     path: Mapping[int, Any] | None = None,
+    temperature: float = 1.0,
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
 
@@ -77,6 +81,7 @@ def fill(
         action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
         parts: poses of single joints that other clips give inside of the gaps.
         path: x and z in metres that the root is led over, by frame; inside of gaps of the whole pose.
+        temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
 
     Returns:
         The completion; `report.open` lists the gaps left open.
@@ -91,7 +96,7 @@ def fill(
     brief = _momentary(clip, observation) if isinstance(gaps, Observation) else None
     if brief and method in ("auto", "spline"):
         mended, seen = _mended(clip, observation, brief)
-        rest = fill(mended, seen, method, max_gap, only, seed, methods, progress, action, (), path)
+        rest = fill(mended, seen, method, max_gap, only, seed, methods, progress, action, (), path, temperature)
         return _with_moments(rest, clip, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
@@ -101,7 +106,7 @@ def fill(
         )
     whole, clip = clip, _handed(clip, observation)
     path_spans(clip, observation, path or ())
-    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action)
+    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
     said: list[tuple[int, slice, Raw]] = []
@@ -310,6 +315,93 @@ def block(poses: Mapping[int, Clip]) -> Clip:
     return first.with_motion(rotation, translation)
 
 
+@dataclass(frozen=True, eq=False)
+class Forecast(Completion):
+    """A clip and what follows, and other ways in which it may go on.
+
+    Attributes:
+        start: the first frame that was not there.
+        samples: all of them, this one first.
+    """
+
+    start: int
+    samples: list[Completion]
+
+    def spread(self) -> np.ndarray:
+        """(frames,) cm by which joints of the samples lie from their mean, in the mean, in each new frame."""
+        positions = np.stack([one.clip.slice(self.start, len(one.clip)).positions() for one in self.samples])
+        off = np.linalg.norm(positions - positions.mean(axis=0), axis=-1)
+        return np.asarray(100 * np.sqrt(np.square(off).mean(axis=(0, 2))))
+
+
+def forecast(
+    clip: Clip,
+    frames: int | None = None,
+    samples: int = 1,
+    method: str = "auto",
+    seed: int | None = None,
+    temperature: float = 1.0,
+    progress: Callable[[float], None] | None = None,
+) -> Forecast:
+    """Go on with a clip, from its last pose and where that is.
+
+    Args:
+        clip: what is known; it comes back unchanged.
+        frames: how many are added; 2 s without it.
+        samples: in how many ways; seeds are counted up from `seed`, or from 1.
+        method: a method, or "auto".
+        seed: of the noise that is injected; a single sample without any is the most likely one.
+        temperature: how much of it; 1 is what the method was trained with.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        RequestError: nothing to go on from, no frame or no sample asked for, a temperature that the method
+            does not have, and what `fill` refuses.
+    """
+    frames = round(AHEAD * clip.fps) if frames is None else frames
+    for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
+        if count < 1:
+            raise RequestError(
+                f"cannot forecast {count} {what}s", "it is a number from 1 on", f"Write for example {fix}."
+            )
+    if frames > FURTHEST * clip.fps:
+        raise RequestError(
+            f"cannot forecast {frames} frames",
+            f"at {clip.fps:g} fps they are more than {FURTHEST / 60:g} minutes",
+            "Ask for fewer.",
+        )
+    if not 0 <= temperature <= HOTTEST:
+        raise RequestError(
+            f"cannot sample at temperature {temperature:g}",
+            "the noise is multiplied with it",
+            f"Choose 0 to {HOTTEST:g}: 1 is what the network was trained with.",
+        )
+    if not len(clip):
+        raise RequestError("there is nothing to go on from", "the clip has no frame", "Name another clip.")
+    held = np.minimum(np.arange(len(clip) + frames), len(clip) - 1)
+    longer = clip.with_motion(clip.rotation[held], clip.translation[held])
+    gap = Gap(len(clip), len(longer))
+    job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
+    chosen = job.method.name if method == "auto" and job.method else method
+    if samples > 1 and not isinstance(registry.get(chosen), Sampler):
+        raise RequestError(
+            f"cannot draw {samples} samples with {chosen}", "it has one answer only", "Use --method stmi-gan."
+        )
+    seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]
+
+    def part(i: int) -> Callable[[float], None] | None:
+        return (lambda share: progress((i + share) / samples)) if progress else None
+
+    done = [
+        fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
+        for i, drawn in enumerate(seeds)
+    ]
+    first = done[0]
+    made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
+    made.samples.extend([made, *done[1:]])
+    return made
+
+
 @dataclass(frozen=True)
 class Loop:
     """How a motion that goes round meets its beginning.
@@ -386,6 +478,7 @@ def plan(
     only: Sequence[int] | None,
     methods: Mapping[int, str],
     action: str = "",
+    temperature: float = 1.0,
 ) -> list[Job]:
     """The runs of incomplete frames, numbered in order of time, each with its method."""
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
@@ -406,7 +499,7 @@ def plan(
         if name == "auto":
             chosen, note = auto.choose(clip, lead, _lone(observation, gap))
         else:
-            chosen = registry.told(name, action)
+            chosen = registry.told(name, action, temperature)
         jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
 

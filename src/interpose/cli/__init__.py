@@ -23,6 +23,7 @@ VERBS = {
         "stitch": "lay clips one after another, and generate what lies between them",
         "recover": "recover joints that are missing in the whole clip or in a range",
         "denoise": "smooth noise, and fill joints that drop out or spike",
+        "forecast": "go on with a clip, in one or in several ways",
         "skeleton": "say which joint is which: how a skeleton is understood",
         "convert": "write a clip in another format, or at another frame rate",
     },

@@ -13,7 +13,6 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
-from scipy.special import entr, rel_entr
 
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
@@ -38,7 +37,8 @@ def psent(sequences: np.ndarray, pooled: bool = False) -> float:
         pooled: as the public code computes it, and the paper's table 1: spectra are first summed over all
             sequences, 1e-8 is added, and then each feature's sum is made 1.
     """
-    return float(entr(_shares(sequences, pooled)).sum(axis=1).mean())
+    shares = _shares(sequences, pooled)
+    return float(-(shares * np.log(np.where(shares > 0, shares, 1.0))).sum(axis=1).mean())
 
 
 def pskl(one: np.ndarray, other: np.ndarray, pooled: bool = False) -> float:
@@ -55,7 +55,7 @@ def pskl(one: np.ndarray, other: np.ndarray, pooled: bool = False) -> float:
     """
     shares = (_shares(sequences, pooled).mean(axis=0) for sequences in (one, other))
     p, q = shares if pooled else (share + EPSILON for share in shares)
-    return float(rel_entr(p, q).sum(axis=0).mean())
+    return float((p * np.log(p / q)).sum(axis=0).mean())
 
 
 def _shares(sequences: np.ndarray, pooled: bool) -> np.ndarray:

@@ -65,3 +65,11 @@ class Actor(Method, Protocol):
 
     def for_action(self, action: str) -> Method:
         """The same method, told another action. Raises RequestError for one that it does not know."""
+
+
+@runtime_checkable
+class Sampler(Method, Protocol):
+    """A method that has many answers, and draws one of them by a seed."""
+
+    def at(self, temperature: float) -> Method:
+        """The same method, its answers more or less apart; 1 is what it was trained with."""

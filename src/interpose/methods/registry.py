@@ -7,7 +7,7 @@ from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 
 from interpose.errors import RequestError, unknown
-from interpose.methods.protocol import Actor, Method
+from interpose.methods.protocol import Actor, Method, Sampler
 
 # name: (module, class); the class is called without arguments.
 METHODS: dict[str, tuple[str, str]] = {
@@ -57,16 +57,34 @@ def get(name: str) -> Method:
         ) from error
 
 
-def told(name: str, action: str) -> Method:
-    """The method of that name, told what the motion is ("" for nothing).
+def told(name: str, action: str = "", temperature: float = 1.0) -> Method:
+    """The method of that name, told what the motion is ("" for nothing) and how far answers may lie apart.
 
-    Raises RequestError for a method that knows no actions, and for an action that it does not know.
+    Raises RequestError for a method that knows no actions or has one answer only, and for an action that it
+    does not know.
     """
-    method = get(name)
+    return warmed(acting(get(name), action), temperature)
+
+
+def acting(method: Method, action: str) -> Method:
+    """The method, told what the motion is; raises as `told` does."""
     if not action:
         return method
     if not isinstance(method, Actor):
         raise RequestError(
-            f"cannot make it {action} with {name}", f"{name} knows no actions", "Use --method cmib."
+            f"cannot make it {action} with {method.name}",
+            f"{method.name} knows no actions",
+            "Use --method cmib.",
         )
     return method.for_action(action)
+
+
+def warmed(method: Method, temperature: float) -> Method:
+    """The method, told how far answers may lie apart: 1 as in training. Raises as `told` does."""
+    if temperature == 1.0:
+        return method
+    if not isinstance(method, Sampler):
+        raise RequestError(
+            f"{method.name} has no temperature", "it has one answer only", "Use --method stmi-gan."
+        )
+    return method.at(temperature)

@@ -70,7 +70,7 @@ class Gated(nn.Module):
         self.second = nn.Linear(width // 2, width)
         self.gate = nn.Linear(width, width)
         # At the start almost everything passes as it is (Srivastava 2015), else six blocks forget the input.
-        nn.init.constant_(self.gate.bias, -3.0)
+        nn.init.constant_(self.gate.bias, -4.0)
 
     def forward(self, x: Tensor) -> Tensor:
         share = torch.sigmoid(self.gate(x))
@@ -218,26 +218,31 @@ class Generator(nn.Module):
         self.encoder = FrameNetwork(2 * values, config.width, config.gates)
         self.blocks = nn.ModuleList(UBlock(config.channels) for _ in range(config.blocks))
         self.decoder = FrameNetwork(config.width, config.width, config.gates, values)
-        self._begin()
         # One for each axis, as in the public code.
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
 
-    def _begin(self) -> None:
-        """At the start the network writes frames as they are and reads back what it wrote.
+    def begin(self, pose: Tensor) -> None:
+        """Start with a network that writes frames and reads back what it wrote.
 
-        So it says of what is known what it knows and of the rest the mean, and has only the rest to learn.
+        It says of what is known what it knows, and of the rest `pose` (22, 3), normalised, in which bones are
+        not without length. So it has only the rest to learn.
         """
         write, copy, read = self.encoder[0], self.decoder[0], self.decoder[-1]
         assert all(isinstance(layer, nn.Linear) for layer in (write, copy, read))
+        together = self.config.together
+        around = pose.flatten().repeat(together)
         with torch.no_grad():
             # (together, coordinates or whether they are known, ...) is how the input is laid out.
-            into = write.weight.unflatten(1, (self.config.together, 2, VALUES))[:, :, 0]
-            into.copy_(nn.init.orthogonal_(torch.empty_like(read.weight.T)).view_as(into))
-            read.weight.copy_(into.flatten(1).T)
+            values, known = write.weight.unflatten(1, (together, 2, VALUES)).unbind(2)
+            into = nn.init.orthogonal_(torch.empty_like(read.weight.T))
+            values.copy_(into.view_as(values))
+            known.copy_((-into * around).view_as(known))
+            read.weight.copy_(into.T)
             nn.init.eye_(copy.weight)
-            for layer in (write, copy, read):
+            for layer in (write, copy):
                 nn.init.zeros_(layer.bias)
+            read.bias.copy_(around)
 
     @property
     def noises(self) -> int:

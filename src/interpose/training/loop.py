@@ -11,6 +11,7 @@ import subprocess
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -108,6 +109,8 @@ def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
 
 class Trainer:
     """Runs one recipe in one folder: `checkpoint.pt`, `averaged.pt` and `log.jsonl` are in there.
+
+    Where TensorBoard is installed its event files are, too: `tensorboard --logdir FOLDER` shows the curves.
 
     Args:
         model: what is trained.
@@ -254,6 +257,17 @@ class Trainer:
             dist.barrier()
         return self.averaged
 
+    def _draw(self, entry: dict[str, float]) -> None:
+        """Curves over steps, for those who look at them in TensorBoard."""
+        if find_spec("tensorboard") is None:
+            return
+        from torch.utils.tensorboard import SummaryWriter
+
+        with SummaryWriter(self.folder) as board:
+            for name, value in entry.items():
+                if name != "step":
+                    board.add_scalar(name, value, int(entry["step"]))
+
     def _tell(self, loss: float) -> None:
         entry = {
             "step": self.budget.spent_steps,
@@ -264,5 +278,6 @@ class Trainer:
         entry |= {name: round(value, 4) for name, value in self.validate(self.averaged).items()}
         with (self.folder / "log.jsonl").open("a") as log:
             log.write(json.dumps(entry) + "\n")
+        self._draw(entry)
         self.save()
         self.say("  ".join(f"{name} {value}" for name, value in entry.items()))

@@ -1,0 +1,151 @@
+"""interpose forecast: how a clip goes on."""
+
+from __future__ import annotations
+
+from json import dumps
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from cyclopts import Parameter
+
+from interpose.cli.console import progress, say, say_json
+from interpose.cli.outputs import Outputs, print_report, to_json, write_text
+from interpose.cli.reading import Reading, describe
+from interpose.errors import RequestError
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
+    from interpose.tasks import Forecast
+
+COLORS = ("#d1495b", "#2a78c2", "#3a9d5d", "#c98a1b", "#7a5bb5", "#2aa4a4", "#b5467f", "#7d7f1f")
+MOST = 100  # samples
+
+
+def forecast(
+    file: Path,
+    /,
+    *,
+    frames: int | None = None,
+    samples: int = 1,
+    seed: int | None = None,
+    temperature: float = 1.0,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    method: str = "auto",
+    player: bool = False,
+    json: bool = False,
+    force: bool = False,
+    reading: Reading = Reading(),  # noqa: B008
+) -> int:
+    """Go on with a clip: frames are added after its last one.
+
+    The clip itself comes back unchanged. Writes take.forecast.bvh and
+    take.forecast.json; of several samples take.forecast.1.bvh, take.forecast.2.bvh
+    and so on, and one report.
+
+    Try:
+      interpose forecast take.bvh
+      interpose forecast take.bvh --frames 120 --player
+      interpose forecast take.bvh --samples 5 --seed 1 --player
+      interpose forecast take.bvh --samples 5 --temperature 2
+
+    Args:
+        file: the clip (.bvh, .npz, .amc).
+        frames: how many to add, at the clip's own rate; 2 seconds without it.
+        samples: in how many ways it may go on; each is written to a file of its own.
+        seed: of what is drawn at random. One sample without it is the most likely one.
+        temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
+        output: where to write the clip; the report goes beside it.
+        method: how it is continued: auto (the default), stmi-gan, linear, ...; `interpose models` lists them.
+        player: write a page (take.forecast.html) that plays all samples; it opens in any browser.
+        json: print the report as JSON.
+        force: replace existing files, of .json files only reports.
+    """
+    from interpose import tasks
+    from interpose.cli.request import check_method
+    from interpose.formats import save
+
+    check_method(method)
+    if samples > MOST:
+        raise RequestError(
+            f"cannot write {samples} samples", f"at most {MOST} are drawn at once", "Ask for fewer."
+        )
+    outputs = Outputs.choose(file, output, "forecast", player)
+    clips = _clips(outputs.clip, samples)
+    clip = reading.load(file)
+    for path in clips:
+        Outputs(path, outputs.report, outputs.page).check(file, force)
+    with progress(f"going on with {file.name}", samples * 100) as advance:
+        done = tasks.forecast(clip, frames, samples, method, seed, temperature, advance)
+    more = _more(done, clips, temperature)
+    report = to_json("forecast", file, clips[0], clip, done, seed, {}, more)
+    page = _page(done, outputs.clip.name) if outputs.page else ""
+    notes: dict[str, None] = {}
+    for path, sample in zip(clips, done.samples):
+        notes |= dict.fromkeys(save(sample.clip, path, force=force))
+    write_text(outputs.report, dumps(report, indent=2, allow_nan=False) + "\n")
+    if outputs.page:
+        write_text(outputs.page, page)
+    if json:
+        say_json(report)
+        return 0
+    say("\n".join([*describe(file, clip), ""]))
+    print_report(done, clip.fps, {})
+    if samples > 1:
+        say(f"the samples lie apart: {_apart(more['spread'])}")
+    written = [*clips, outputs.report, *([outputs.page] if outputs.page else [])]
+    say("\n".join(["", *(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, written))}"]))
+    return 0
+
+
+def _clips(clip: Path, samples: int) -> list[Path]:
+    """take.forecast.bvh, or take.forecast.1.bvh and so on."""
+    if samples == 1:
+        return [clip]
+    return [clip.with_name(f"{clip.stem}.{number}{clip.suffix}") for number in range(1, samples + 1)]
+
+
+def _more(done: Forecast, clips: list[Path], temperature: float) -> dict[str, Any]:
+    """What only this verb says: where the samples are, and how far they lie apart from when on."""
+    if len(clips) == 1:
+        return {"start": done.start}
+    apart, fps = done.spread(), done.clip.fps
+    horizons = [s for s in (0.25, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0, 8.0) if round(s * fps) <= len(apart)]
+    spread = {f"{s:g}": round(float(apart[round(s * fps) - 1]), 3) for s in horizons}
+    return {
+        "start": done.start,
+        "samples": [str(path) for path in clips],
+        "temperature": temperature,
+        "spread": spread or {f"{len(apart) / fps:.3g}": round(float(apart[-1]), 3)},
+    }
+
+
+def _apart(spread: dict[str, float]) -> str:
+    return ", ".join(f"{value:.1f} cm after {at} s" for at, value in spread.items()) + " (deviation of joints)"
+
+
+def _page(done: Forecast, title: str) -> str:
+    """A page that plays all samples over each other."""
+    from interpose.show import Take, player
+
+    several = len(done.samples) > 1
+    takes = [
+        Take(f"sample {i + 1}" if several else "forecast", one.clip.positions(), COLORS[i % len(COLORS)])
+        for i, one in enumerate(done.samples[: len(COLORS)])
+    ]
+    clip, skeleton = done.clip, done.clip.skeleton
+    span = (max(0, done.start - round(4 * clip.fps)), len(clip)) if _long(clip, len(takes)) else None
+    return player(
+        takes,
+        skeleton.parents,
+        clip.fps,
+        done.report.gaps,
+        title=title,
+        report=str(done.report),
+        names=skeleton.names,
+        span=span,
+    )
+
+
+def _long(clip: Clip, takes: int) -> bool:
+    """Whether only the end of it is worth a page: more than a minute over all."""
+    return len(clip) * takes > 60 * clip.fps

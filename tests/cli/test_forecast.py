@@ -1,0 +1,78 @@
+"""interpose forecast: what is added, what stays, and what goes wrong."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose.formats import load
+
+
+@pytest.fixture
+def walk(tmp_path, data):
+    """walk.bvh (209 frames at 30 fps), in the current folder."""
+    shutil.copy(data / "cmu_walk.bvh", tmp_path / "walk.bvh")
+    return tmp_path / "walk.bvh"
+
+
+def test_two_seconds_are_added(run, walk):
+    done = run("forecast", "walk.bvh", "--player")
+    assert done.code == 0
+    was, made = load(walk), load(walk.with_name("walk.forecast.bvh"))
+    assert len(made) == len(was) + round(2 * was.fps)
+    assert np.array_equal(made.rotation[: len(was)], was.rotation)
+    assert np.array_equal(made.translation[: len(was)], was.translation)
+    report = json.loads(walk.with_name("walk.forecast.json").read_text())
+    assert report["verb"] == "forecast"
+    assert report["start"] == len(was)
+    assert [gap["frames"] for gap in report["gaps"]] == [f"{len(was)}:{len(made)}"]
+    assert report["gaps"][0]["seam_after"] <= report["gaps"][0]["seam_limit"]
+    assert "<html" in walk.with_name("walk.forecast.html").read_text()
+
+
+def test_as_many_frames_as_asked_for(run, walk):
+    assert run("forecast", "walk.bvh", "--frames", "7", "--method", "linear", "-o", "on.bvh").code == 0
+    assert len(load(walk.with_name("on.bvh"))) == len(load(walk)) + 7
+
+
+def test_nothing_is_replaced_unasked(run, walk):
+    assert run("forecast", "walk.bvh", "--method", "linear").code == 0
+    again = run("forecast", "walk.bvh", "--method", "linear")
+    assert again.code == 2
+    assert "--force" in again.err
+    assert run("forecast", "walk.bvh", "--method", "linear", "--force").code == 0
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--frames", "0"), "cannot forecast 0 frames"),
+        (("--frames", "100000000"), "are more than 10 minutes"),
+        (("--samples", "0"), "cannot forecast 0 samples"),
+        (("--samples", "3", "--method", "linear"), "it has one answer only"),
+        (("--temperature", "2", "--method", "linear"), "linear has no temperature"),
+        (("--temperature", "-1"), "cannot sample at temperature -1"),
+        (("--temperature", "nan"), "cannot sample at temperature nan"),
+        (("--samples", "1000"), "cannot write 1000 samples"),
+        (("--method", "nonsense"), "unknown method: nonsense"),
+    ],
+)
+def test_what_cannot_be_asked_for(run, walk, options, said):
+    done = run("forecast", "walk.bvh", *options)
+    assert done.code == 2
+    assert said in done.err
+    assert not walk.with_name("walk.forecast.bvh").exists()
+
+
+def test_from_python(walk):
+    clip = load(walk)
+    one = interpose.forecast(clip, 20, method="linear")
+    assert one.start == len(clip)
+    assert len(one.clip) == len(clip) + 20
+    assert one.samples == [one]
+    assert np.array_equal(one.spread(), np.zeros(20))
+    assert len(interpose.forecast(walk, method="zero-velocity").clip) == len(clip) + round(2 * clip.fps)
