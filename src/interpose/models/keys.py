@@ -26,7 +26,7 @@ def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def pick(values: Tensor, index: Tensor) -> Tensor:
-    """Values (B, T) or (B, T, n) at frames (B, T)."""
+    """Values (B, T) or (B, T, n) at frames (B, S): (B, S) or (B, S, n)."""
     if values.ndim == 3:
         index = index[..., None].expand(-1, -1, values.shape[2])
     return values.gather(1, index)

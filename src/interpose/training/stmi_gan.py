@@ -173,23 +173,22 @@ class Game:
     def opponent_loss(self, rng: np.random.Generator, fraction: float) -> Tensor:
         """Of the discriminator: which motions are the data's, and the R1 penalty on those (equation 4).
 
-        The penalty is on what the branches see, which is of one size, and not on metres: so it weighs the
-        same at every frame rate.
+        The penalty is on how fast the score changes with normalised coordinates, those that the generator
+        makes. Steps from frame to frame are small, so a score of steps changes fast with them: without that
+        penalty it pulls at coordinates harder than all that is known, the more so at high frame rates.
         """
         self.motions = self.play(rng)
         penalised = self.turn % self.settings.every == 0
         self.turn += 1
-        with torch.autocast(self.motions.truth.device.type, torch.bfloat16):
-            fake = self.discriminator(self.discriminator.seen(self.motions.made.detach())).float()
-            seen = {
-                name: value.requires_grad_(penalised)
-                for name, value in self.discriminator.seen(self.motions.truth).items()
-            }
-            real = self.discriminator(seen).float()
+        judge, std = self.discriminator, self.generator.std
+        truth = (self.motions.truth / std).requires_grad_(penalised)
+        with torch.autocast(truth.device.type, torch.bfloat16):
+            fake = judge(judge.seen(self.motions.made.detach())).float()
+            real = judge(judge.seen(truth * std)).float()
         loss = functional.softplus(fake).mean() + functional.softplus(-real).mean()
         if penalised:
-            slopes = torch.autograd.grad(real.sum(), list(seen.values()), create_graph=True)
-            steep = torch.stack([slope.float().square().sum(dim=(1, 2)) for slope in slopes]).sum(dim=0)
+            (slope,) = torch.autograd.grad(real.sum(), truth, create_graph=True)
+            steep = slope.square().sum(dim=(1, 2, 3))
             loss = loss + 0.5 * self.settings.gamma * self.settings.every * steep.mean()
         return loss
 

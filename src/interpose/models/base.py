@@ -1,0 +1,319 @@
+"""interpose's own network: any part of a motion in, all of it out (`base`, and `small` of the same kind).
+
+What is observed is said per joint and frame. Where nothing is, a classical completion that goes on as the
+motion was going is the starting point, and a transformer encoder says what to add to it; so what is observed
+comes back exactly, and a network that knows nothing is as good as that completion.
+
+What it shares with others: rotations as two columns (Zhou et al. 2019), a residual on interpolation seen from
+the last known pose (Oreshkin et al. 2022), a learned bias for how far frames are apart and the distance to
+known ones as an input (Qin et al. 2022). Its starting point uses velocities, which theirs does not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import torch
+from torch import Tensor, nn
+
+from interpose.geometry import kinematics, rotations
+from interpose.geometry.ground import turn
+from interpose.models.keys import neighbours, pick
+from interpose.skeletons import JOINTS, PARENTS
+from interpose.skeletons.body import facing
+
+COUNT = len(JOINTS)
+FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
+SECOND = 30.0  # frames
+VELOCITY = 10.0  # what velocities (m or matrix entries a frame) are multiplied with, to be about 1
+# Numbers of a frame that the network sees: columns of rotations, hips, joints around them, how both move,
+# what is known, pins and whether there are any, and how near known frames are.
+SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
+
+
+@dataclass(frozen=True)
+class BaseConfig:
+    """What the network is.
+
+    Attributes:
+        labels: action labels; the first is "", for motions without one.
+        width, heads, layers: of the transformer; its inner layers are four times as wide.
+        dropout: in training.
+        longest: frames that it can see at once.
+        residual: whether it says what to add to the starting point; else it says everything itself.
+        velocities: whether the starting point goes on with the observed velocities; else it is a straight
+            line, and a great arc, between known values.
+        near: whether the motion is seen from the last known pose; else from the first frame.
+        apart: whether attention has a learned part for how far two frames are apart.
+        distances: whether the network is told how far known frames are.
+    """
+
+    labels: tuple[str, ...] = ("",)
+    width: int = 192
+    heads: int = 6
+    layers: int = 6
+    dropout: float = 0.0
+    longest: int = 192
+    residual: bool = True
+    velocities: bool = True
+    near: bool = True
+    apart: bool = True
+    distances: bool = True
+
+
+SMALL = BaseConfig()
+BASE = BaseConfig(width=512, heads=8)
+CONFIGS = {"small": SMALL, "base": BASE}
+
+
+@dataclass
+class Motion:
+    """Motions of a body scaled to the canonical leg.
+
+    Attributes:
+        local: (B, T, 22, 4) canonical rotations, relative to the parent's.
+        root: (B, T, 3) metres, the hips.
+    """
+
+    local: Tensor
+    root: Tensor
+
+    def forward(self, bones: Tensor) -> tuple[Tensor, Tensor]:
+        """Global rotations (B, T, 22, 4) and positions (B, T, 22, 3) with bones (B, 22, 3)."""
+        move = bones[:, None].expand(*self.local.shape[:-1], 3)
+        hips = torch.arange(COUNT, device=move.device)[:, None] == 0
+        return kinematics.forward(self.local, torch.where(hips, self.root[:, :, None], move), PARENTS)
+
+
+def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Tensor:
+    """Values (N, T, n) of known frames (N, T); in between a line that is left and met at their velocities.
+
+    A cubic of Hermite in which what the velocities differ from the line by dies away within `reach` (n)
+    frames, so that long gaps do not swing out. Next to a lone known frame, and without `reach`, there is no
+    velocity but the line's. At open ends the value is held, after its velocity has died away.
+    """
+    last, first = neighbours(known)
+    frame = torch.arange(values.shape[1], device=values.device)
+    since, until = ((d.clamp(min=0)).to(values.dtype)[..., None] for d in (frame - last, first - frame))
+    length = (first - last).to(values.dtype)[..., None]
+    between = length > 0
+    share = torch.where(between, since / length.clamp(min=1.0), (until > 0).to(values.dtype))
+    a, b = pick(values, last), pick(values, first)
+    line = a + share * (b - a)
+    if reach is None:
+        return line
+    slope = torch.where(between, (b - a) / length.clamp(min=1.0), torch.zeros_like(a))
+    step = values[:, 1:] - values[:, :-1]
+    both = known[:, 1:] & known[:, :-1]
+    step = torch.where(both[..., None], step, 0.0)
+    before, after = nn.functional.pad(step, (0, 0, 1, 0)), nn.functional.pad(step, (0, 0, 0, 1))
+    has_before, has_after = nn.functional.pad(both, (1, 0)), nn.functional.pad(both, (0, 1))
+    leave = torch.where(pick(has_before, last)[..., None], pick(before, last) - slope, 0.0)
+    meet = torch.where(pick(has_after, first)[..., None], pick(after, first) - slope, 0.0)
+    return (
+        line
+        + leave * since * (1 - share) ** 2 * torch.exp(-since / reach)
+        - meet * until * share**2 * torch.exp(-until / reach)
+    )
+
+
+class Block(nn.Module):
+    """Attention and two layers, normalised before each (Xiong et al. 2020)."""
+
+    def __init__(self, width: int, heads: int, dropout: float) -> None:
+        super().__init__()
+        self.heads = heads
+        self.norms = nn.ModuleList(nn.LayerNorm(width) for _ in range(2))
+        self.ask = nn.Linear(width, 3 * width)
+        self.say = nn.Linear(width, width)
+        self.inner = nn.Linear(width, 4 * width)
+        self.outer = nn.Linear(4 * width, width)
+        self.dropout = nn.Dropout(dropout)
+
+    def forward(self, x: Tensor, bias: Tensor | None) -> Tensor:
+        """x: (B, T, width); bias: (heads, T, T), added to how much frames attend to each other."""
+        asked = self.ask(self.norms[0](x)).unflatten(2, (3, self.heads, -1))
+        query, key, value = asked.permute(2, 0, 3, 1, 4).unbind(0)
+        score = query @ key.transpose(2, 3) / math.sqrt(query.shape[-1])
+        weight = torch.softmax(score if bias is None else score + bias.to(score.dtype), dim=-1)
+        told = (weight @ value).transpose(1, 2).flatten(2)
+        x = x + self.dropout(self.say(told))
+        deep = nn.functional.gelu(self.inner(self.norms[1](x)))
+        return x + self.dropout(self.outer(deep))
+
+
+@dataclass
+class Start:
+    """The starting point, and from where it is seen.
+
+    Attributes:
+        motion: the classical completion.
+        turned, placed: (B, T, 22, 4) and (B, T, 22, 3), its global rotations and positions.
+        origin, yaw: (B, 3) and (B,), of the pose that all is seen from.
+    """
+
+    motion: Motion
+    turned: Tensor
+    placed: Tensor
+    origin: Tensor
+    yaw: Tensor
+
+
+@dataclass
+class Answer:
+    """What the network says.
+
+    Attributes:
+        motion: complete; what is known is as it was.
+        contact: (B, T, 4) logits of whether the joints FEET stand.
+        risk: (B, T) logarithm of by how many cm joints are expected to be off, in the mean.
+    """
+
+    motion: Motion
+    contact: Tensor
+    risk: Tensor
+
+
+class Base(nn.Module):
+    """Part of a motion in, all of it out. Values that are not known may be anything finite."""
+
+    def __init__(self, config: BaseConfig = SMALL) -> None:
+        super().__init__()
+        self.config = config
+        width = config.width
+        self.see = nn.Linear(SEEN, width)
+        self.body = nn.Linear(3 * COUNT, width)
+        self.label = nn.Embedding(len(config.labels), width)
+        self.blocks = nn.ModuleList(Block(width, config.heads, config.dropout) for _ in range(config.layers))
+        self.norm = nn.LayerNorm(width)
+        self.say = nn.Linear(width, 6 * COUNT + 3 + len(FEET) + 1)
+        self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1))
+        # The logarithm of how many frames velocities reach: of rotations and of the hips.
+        self.reach = nn.Parameter(torch.full((2,), math.log(6.0)))
+        nn.init.zeros_(self.say.weight)
+        nn.init.zeros_(self.say.bias)
+        nn.init.zeros_(self.label.weight)
+
+    def start(self, local: Tensor, root: Tensor, known: Tensor, bones: Tensor) -> Start:
+        """The classical completion of what is known; arguments as in `complete`."""
+        batch, count = local.shape[:2]
+        held = known > 0
+        columns = torch.cat([rotations.to_6d(local), nn.functional.pad(root, (0, 3))[:, :, None]], dim=2)
+        columns = torch.where(held[..., None], columns, 0.0)
+        flat = columns.transpose(1, 2).flatten(0, 1)
+        reach = torch.exp(self.reach)
+        reach = torch.cat([reach[:1].expand(COUNT), reach[1:]]).repeat(batch)[:, None, None]
+        done = complete_columns(
+            flat, held.transpose(1, 2).flatten(0, 1), reach if self.config.velocities else None
+        )
+        done = done.unflatten(0, (batch, COUNT + 1)).transpose(1, 2)
+        # Joints that are never known stand as in the T-pose.
+        never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
+        rest = done.new_tensor([1.0, 0, 0, 0, 1.0, 0])
+        turned = rotations.from_6d(torch.where(never, rest, done[:, :, :COUNT]))
+        turned = torch.where(held[:, :, :COUNT, None], local, turned)
+        motion = Motion(turned, done[:, :, COUNT, :3])
+        globals_, placed = motion.forward(bones)
+        seen = held[..., 0] & held[..., COUNT]
+        if self.config.near:
+            frame = torch.arange(count, device=held.device)
+            missing = torch.where(held.all(dim=2), count - 1, frame).amin(dim=1, keepdim=True)
+            at = neighbours(seen)[0].gather(1, missing)
+        else:
+            at = torch.zeros(batch, 1, dtype=torch.long, device=held.device)
+        pose = pick(placed.flatten(2), at).unflatten(2, (COUNT, 3))[:, 0]
+        origin = pose[:, 0] * pose.new_tensor([1.0, 0.0, 1.0])
+        return Start(motion, globals_, placed, origin, facing(pose))
+
+    def features(self, start: Start, known: Tensor, pinned: Tensor, pins: Tensor) -> Tensor:
+        """(B, T, SEEN): what the network sees of the starting point, from where it is seen."""
+        ahead = rotations.about("Y", -start.yaw)[:, None, None]
+        turned = rotations.to_6d(rotations.multiply(ahead, start.turned))
+        yaw = -start.yaw[:, None, None]
+        placed = turn(start.placed - start.origin[:, None, None], yaw)
+        hips, around = placed[:, :, 0], placed[:, :, 1:] - placed[:, :, :1]
+        around = nn.functional.pad(around, (0, 0, 1, 0))  # the hips themselves, at 0
+        steps = [nn.functional.pad(some.diff(dim=1), (0, 0, 1, 0)) for some in (hips, around.flatten(2))]
+        there = pins & torch.isfinite(pinned).all(dim=-1)
+        off = torch.where(there[..., None], turn(pinned - start.placed, yaw), 0.0)
+        last, first = neighbours((known > 0).all(dim=2))
+        frame = torch.arange(known.shape[1], device=known.device)
+        far = torch.stack([frame - last, first - frame], dim=-1).clamp(min=0).to(hips.dtype)
+        near = torch.cat([far / SECOND, 1 / (1 + far)], dim=-1)
+        if not self.config.distances:
+            near = torch.zeros_like(near)
+        parts = [turned.flatten(2), hips, around.flatten(2), *(VELOCITY * step for step in steps)]
+        parts += [known.to(hips.dtype), off.flatten(2), there.to(hips.dtype), near]
+        return torch.cat(parts, dim=2)
+
+    def complete(
+        self,
+        local: Tensor,
+        root: Tensor,
+        known: Tensor,
+        pinned: Tensor,
+        pins: Tensor,
+        label: Tensor,
+        bones: Tensor,
+    ) -> Answer:
+        """Complete a motion.
+
+        Args:
+            local: (B, T, 22, 4) canonical rotations relative to the parent's.
+            root: (B, T, 3) metres, the hips of a body scaled to the canonical leg.
+            known: (B, T, 23) 0 to 1, how far each rotation, and last the place of the hips, is known: 0 not
+                at all, 1 exactly; what is in between is taken for noisy.
+            pinned: (B, T, 22, 3) metres, where joints are to be.
+            pins: (B, T, 22) booleans, of which joints that is said.
+            label: (B,) index into the configuration's labels; 0 for none.
+            bones: (B, 22, 3) metres.
+        """
+        config, count = self.config, local.shape[1]
+        start = self.start(local, root, known, bones)
+        x = self.see(self.features(start, known, pinned, pins))
+        x = x + (self.body(5 * bones.flatten(1)) + self.label(label))[:, None]
+        bias = None
+        if config.apart:
+            frame = torch.arange(count, device=x.device)
+            bias = self.apart[:, frame[:, None] - frame + config.longest - 1]
+        for block in self.blocks:
+            x = block(x, bias)
+        said = self.say(self.norm(x)).float()
+        columns, moved, contact, risk = said.split([6 * COUNT, 3, len(FEET), 1], dim=2)
+
+        exactly = known >= 1
+        # A joint's global rotation is known if its own and all above it are.
+        above = exactly[..., :COUNT].clone()
+        for joint, parent in enumerate(PARENTS):
+            if parent >= 0:
+                above[..., joint] = above[..., joint] & above[..., parent]
+        ahead = rotations.about("Y", -start.yaw)[:, None, None]
+        begin = rotations.to_6d(rotations.multiply(ahead, start.turned))
+        columns = columns.unflatten(2, (COUNT, 6))
+        if not config.residual:
+            columns = columns + columns.new_tensor([1.0, 0, 0, 0, 1.0, 0]) - begin
+        turned = rotations.from_6d(begin + torch.where(above[..., None], 0.0, columns))
+        turned = rotations.multiply(rotations.conjugate(ahead), turned)
+        turned = kinematics.local_rotations(turned, PARENTS)
+        turned = torch.where(exactly[..., :COUNT, None], local, turned)
+        way = turn(moved, start.yaw[:, None])
+        if not config.residual:
+            way = way + start.origin[:, None] - start.motion.root
+        placed = start.motion.root + torch.where(exactly[..., COUNT:], 0.0, way)
+        return Answer(Motion(turned, placed), contact, risk[..., 0])
+
+    def forward(
+        self,
+        local: Tensor,
+        root: Tensor,
+        known: Tensor,
+        pinned: Tensor,
+        pins: Tensor,
+        label: Tensor,
+        bones: Tensor,
+    ) -> tuple[Tensor, Tensor, Tensor, Tensor]:
+        """What ONNX holds: `complete`, as rotations (B, T, 22, 4), hips (B, T, 3), contacts (B, T, 4) 0 to 1
+        and the expected error (B, T) in cm."""
+        answer = self.complete(local, root, known, pinned, pins, label, bones)
+        return answer.motion.local, answer.motion.root, torch.sigmoid(answer.contact), torch.exp(answer.risk)
