@@ -96,7 +96,9 @@ def fill(
     brief = _momentary(clip, observation) if isinstance(gaps, Observation) else None
     if brief and method in ("auto", "spline"):
         mended, seen = _mended(clip, observation, brief)
-        rest = fill(mended, seen, method, max_gap, only, seed, methods, progress, action, (), path, temperature)
+        rest = fill(
+            mended, seen, method, max_gap, only, seed, methods, progress, action, (), path, temperature
+        )
         return _with_moments(rest, clip, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(

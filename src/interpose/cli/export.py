@@ -65,6 +65,25 @@ def cae(
 
 
 @export.command
+def base(
+    *,
+    of: Of,
+    out: Path,
+) -> None:
+    """Write base.onnx or small.onnx, its card, and the training log with its curves.
+
+    Try:
+      interpose export base --run runs/small --packs packs --out weights/small
+
+    Args:
+        out: the folder for the weights.
+    """
+    with needs_torch("export a network"):
+        from interpose.training.export import export_base
+    _export(export_base, of, out)
+
+
+@export.command
 def cmib(
     *,
     of: Of,

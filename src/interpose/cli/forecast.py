@@ -120,7 +120,9 @@ def _more(done: Forecast, clips: list[Path], temperature: float) -> dict[str, An
 
 
 def _apart(spread: dict[str, float]) -> str:
-    return ", ".join(f"{value:.1f} cm after {at} s" for at, value in spread.items()) + " (deviation of joints)"
+    return (
+        ", ".join(f"{value:.1f} cm after {at} s" for at, value in spread.items()) + " (deviation of joints)"
+    )
 
 
 def _page(done: Forecast, title: str) -> str:

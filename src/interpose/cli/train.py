@@ -113,6 +113,21 @@ def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipp
 
 
 @train.command
+def base(*, run: Run) -> None:
+    """Train interpose's own network, for every task. An interrupted run goes on where it stopped.
+
+    Try:
+      interpose train base --packs packs --out runs/small --budget 2h
+      interpose train base --out runs/base --set config=base
+      interpose train base --out runs/lafan1 --set datasets=lafan1 --set tasks=gap
+      interpose train base --out runs/lines --set velocities=0   (a trial)
+    """
+    with needs_torch("train a network"):
+        from interpose.training.base import BaseSettings, train_base
+    _train(train_base, BaseSettings(), "base", run)
+
+
+@train.command
 def cae(*, run: Run) -> None:
     """Train the convolutional autoencoder of Kaufmann et al. An interrupted run goes on where it stopped.
 

@@ -189,8 +189,10 @@ class Base(nn.Module):
         self.norm = nn.LayerNorm(width)
         self.say = nn.Linear(width, 6 * COUNT + 3 + len(FEET) + 1)
         self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1))
-        # The logarithm of how many frames velocities reach: of rotations and of the hips.
-        self.reach = nn.Parameter(torch.full((2,), math.log(6.0)))
+        # The logarithm of how many frames velocities reach, of rotations and of the hips: near what is best
+        # for the starting point alone, on validation performers, where it leaves .67, .79, .85 and .84 of the
+        # error of straight lines and great arcs in gaps of 5, 15, 30 and 45 frames.
+        self.reach = nn.Parameter(torch.tensor([20.0, 45.0]).log())
         nn.init.zeros_(self.say.weight)
         nn.init.zeros_(self.say.bias)
         nn.init.zeros_(self.label.weight)
@@ -279,7 +281,7 @@ class Base(nn.Module):
             bias = self.apart[:, frame[:, None] - frame + config.longest - 1]
         for block in self.blocks:
             x = block(x, bias)
-        said = self.say(self.norm(x)).float()
+        said = self.say(self.norm(x)).to(start.motion.root.dtype)
         columns, moved, contact, risk = said.split([6 * COUNT, 3, len(FEET), 1], dim=2)
 
         exactly = known >= 1

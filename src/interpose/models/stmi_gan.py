@@ -54,8 +54,8 @@ class StmiGanConfig:
 
 
 PAPER = StmiGanConfig()
-# For users: 4 s at 30 fps, with one more level to see as much time. At that rate a frame says little that the
-# one before it does not: four are encoded into as many values as they have coordinates, which takes a third of
+# For users: 4 s at 30 fps, with one more level to see as much time. At that rate a frame says little that
+# the one before it does not: four are encoded into as many values as they have coordinates, which takes half
 # the time of an image with a row for each.
 DENSE = StmiGanConfig(frames=120, fps=30.0, together=4, channels=(32, 64, 96, 96))
 CONFIGS = {"paper": PAPER, "dense": DENSE}
@@ -78,7 +78,7 @@ class Gated(nn.Module):
 
 
 class FrameNetwork(nn.Sequential):
-    """Each frame, or few together, by itself: (..., into) to (..., out), through gated blocks `width` wide."""
+    """Each frame, or few together, by itself: (..., into) to (..., out), in gated blocks `width` wide."""
 
     def __init__(self, into: int, width: int, gates: int, out: int | None = None) -> None:
         last = [] if out is None else [nn.Linear(width, out)]

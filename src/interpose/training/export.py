@@ -17,12 +17,14 @@ from torch.nn.attention import SDPBackend, sdpa_kernel
 from interpose.datasets import DATASETS, Pack
 from interpose.errors import RequestError
 from interpose.methods.weights import Card
+from interpose.models.base import Base, BaseConfig
 from interpose.models.cae import Infiller
 from interpose.models.cmib import Cmib, CmibConfig
 from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig
 from interpose.models.stmi_gan import Generator, StmiGanConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
+from interpose.training.base import chosen
 from interpose.training.cae import NETWORKS
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 
@@ -77,6 +79,22 @@ def export_stmi_gan_onnx(model: Generator, path: Path) -> None:
         "noise": (noise, clips),
     }
     _write_graph(model, inputs, ["raw", "completed"], path)
+
+
+def export_base_onnx(model: Base, path: Path) -> None:
+    """Write `base` or `small` as one graph, for any number of motions and frames up to its longest."""
+    sizes = _sizes(model.config.longest)
+    shape, clips = (2, 40, len(JOINTS)), {0: sizes[0]}
+    inputs = {
+        "local": (torch.nn.functional.normalize(torch.randn(*shape, 4), dim=-1), sizes),
+        "root": (torch.randn(2, 40, 3), sizes),
+        "known": ((torch.rand(2, 40, len(JOINTS) + 1) > 0.2).float(), sizes),
+        "pinned": (torch.zeros(*shape, 3), sizes),
+        "pins": (torch.zeros(shape, dtype=torch.bool), sizes),
+        "label": (torch.zeros(2, dtype=torch.long), clips),
+        "bones": (torch.rand(2, len(JOINTS), 3), clips),
+    }
+    _write_graph(model, inputs, ["local_out", "root_out", "contact", "error"], path)
 
 
 def export_seq2seq_onnx(model: Seq2Seq, path: Path) -> None:
@@ -305,6 +323,39 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         metrics={"validation": log[-1]},
     )
     card.save(out / "stmi-gan.json")
+    return card
+
+
+def export_base(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+    """Write `base.onnx` or `small.onnx`, its card, the log and its curves into `out` from a run's folder."""
+    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    network = settings.pop("network")
+    name, labels = settings["config"], network["labels"]
+    _check_free(out, name)
+    model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
+    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
+    out.mkdir(parents=True, exist_ok=True)
+    export_base_onnx(model, out / f"{name}.onnx")
+    log, earlier, _ = _history(folder)
+    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
+    del network["labels"]
+    packs = chosen(packs, settings["datasets"])
+    card = Card(
+        name=name,
+        method=name,
+        description="interpose's own network: whatever is missing of a motion",
+        licence=_licence(packs),
+        data=_data(packs, splits),
+        tasks=["fill", "between", "recover", "forecast"],
+        joints=list(JOINTS),
+        fps=30.0,
+        max_gap=settings["longest"],
+        training={**_training("base", settings, splits, log, earlier, model), "network": network},
+        metrics={"validation": log[-1]},
+        labels=labels,
+    )
+    card.save(out / f"{name}.json")
     return card
 
 

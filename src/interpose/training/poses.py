@@ -110,11 +110,13 @@ class Poses:
         chosen = torch.from_numpy(clip).to(self.device)
         return Batch(turned, self.root[index], self.bones[chosen], self.label[chosen])
 
-    def draw(self, rng: np.random.Generator, batch: int, length: int) -> Batch:
-        """A random batch, half of it mirrored left to right."""
+    def draw(self, rng: np.random.Generator, batch: int, length: int, mirror: bool = True) -> Batch:
+        """A random batch, half of it mirrored left to right unless said otherwise."""
         weight = np.maximum(self.counts - length + 1, 0)
         clip = rng.choice(len(weight), batch, p=weight / weight.sum())
         drawn = self.at(clip, (rng.random(batch) * weight[clip]).astype(int), length)
+        if not mirror:
+            return drawn
         flip = torch.from_numpy(rng.random(batch) < 0.5).to(self.device)[:, None, None]
         mirrored = drawn.rotation[:, :, self.sides] * drawn.rotation.new_tensor([1.0, 1, -1, -1])
         side = drawn.root.new_tensor([-1.0, 1, 1])

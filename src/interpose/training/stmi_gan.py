@@ -239,7 +239,7 @@ def fit_normaliser(
     for network in (generator, discriminator):
         network.mean.copy_(motion.mean(dim=(0, 1, 2)))
         network.std.copy_(motion.std(dim=(0, 1, 2)))
-    generator.begin(((motion.mean(dim=(0, 1)) - generator.mean) / generator.std))
+    generator.begin((motion.mean(dim=(0, 1)) - generator.mean) / generator.std)
     apart = distances(motion)
     found = (apart, motion.diff(dim=1), apart.diff(dim=1))
     discriminator.sizes.copy_(torch.stack([value.square().mean().sqrt() for value in found]))
@@ -329,7 +329,7 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
         figures[f"moves{quarter + 1}"] = float(moved[0] / moved[1])
         entropy = [psent(some[:, part]) for some in angles]
         figures[f"entropy{quarter + 1}"] = entropy[0] / entropy[1]
-        figures[f"pskl{quarter + 1}"] = pskl(*(some[:, part] for some in angles))
+        figures[f"pskl{quarter + 1}"] = pskl(angles[0][:, part], angles[1][:, part])
     return figures
 
 

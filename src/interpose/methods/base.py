@@ -1,0 +1,181 @@
+"""interpose's own networks as methods: whatever of a pose is missing, on the user's skeleton and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import unknown
+from interpose.geometry import kinematics, rotations
+from interpose.geometry.time import (
+    runs,
+    sample,
+    sample_rotations,
+    sample_rotations_smooth,
+    sample_smooth,
+)
+from interpose.methods import weights
+from interpose.methods.bodies import no_humanoid, observed_body
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+from interpose.skeletons import PARENTS, Mapping, find_mapping
+
+CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
+COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
+
+
+@dataclass(frozen=True)
+class Base:
+    """Completes poses by what it has seen; thinks at 30 fps on 22 joints scaled to one leg.
+
+    Attributes:
+        name: of the weights: base or small.
+        action: a label of its card; "" leaves it open.
+        trained: the weights; the installed ones without any.
+    """
+
+    name: str = "base"
+    action: str = ""
+    trained: weights.Card | None = None
+
+    @property
+    def card(self) -> weights.Card:
+        return self.trained or weights.find(self.name)
+
+    def for_action(self, action: str) -> Base:
+        """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
+        if action not in self.card.labels:
+            raise unknown("action", action, [label for label in self.card.labels if label])
+        return Base(self.name, action, self.trained)
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        """Why not: no humanoid, joints that it does not know, or more frames without a pose than it knows."""
+        mapping = find_mapping(clip.skeleton)
+        if reason := no_humanoid(mapping):
+            return reason
+        if gap.joints is not None:
+            known = {clip.skeleton.names[joint] for joint in mapping.mapped[1]}
+            return None if known & {*gap.joints} else "it knows none of these joints"
+        length = len(gap) * self.card.fps / clip.fps
+        if length > self.card.max_gap and gap.start > 0 and gap.stop < len(clip):
+            at = f"{length:.0f} frames at {self.card.fps:g} fps"
+            return f"{at} are more than the {self.card.max_gap} it can fill"
+        return None
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        """Rotations of the mapped joints and the way of the hips; a spline for all else."""
+        card, body = self.card, observed_body(clip, observation)
+        base = Spline().complete(clip, observation).clip
+        turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
+        known = knowledge(observation, body.mapping)
+        times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
+        before = np.floor(times).astype(int)
+        after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
+        local = kinematics.local_rotations(turned, PARENTS)
+        label = card.labels.index(self.action) if self.action else 0
+        said_local, said_root = run_long(
+            card,
+            sample_rotations(local, times),
+            sample(root, times),
+            known[before] & known[after],
+            label,
+            bones,
+        )
+        said = kinematics.global_rotations(said_local, PARENTS)
+        missing = ~known.all(axis=1)
+        back = np.arange(len(clip))[missing] * card.fps / clip.fps
+        # What is known of a frame is exactly so; only what is not is the network's.
+        turns = rotations.normalize(sample_rotations_smooth(rotations.continuous(said), back))
+        own = kinematics.local_rotations(turns, PARENTS)
+        local[missing] = np.where(known[missing, : len(PARENTS), None], local[missing], own)
+        root[missing] = np.where(known[missing, -1:], root[missing], sample_smooth(said_root, back))
+        done = body.to_clip(kinematics.global_rotations(local, PARENTS), root / body.scale, base)
+        return Raw(done, notes={"model": card.name})
+
+
+def small() -> Base:
+    """The one that is small enough for everywhere."""
+    return Base("small")
+
+
+def knowledge(observation: Observation, mapping: Mapping) -> np.ndarray:
+    """(F, 23) which canonical rotations, relative to the parent's, and last which hips' places are known.
+
+    A rotation needs those of all joints between it and the canonical joint that it hangs from; joints that
+    the skeleton does not have are known to turn with their parent.
+    """
+    skeleton, rows = mapping.skeleton, dict(zip(*mapping.mapped))
+    found = np.ones((len(observation.rotation), COLUMNS), bool)
+    ends = set(rows.values())
+    for row, joint in rows.items():
+        chain = [joint]
+        while skeleton.parents[chain[-1]] >= 0 and skeleton.parents[chain[-1]] not in ends:
+            chain.append(skeleton.parents[chain[-1]])
+        found[:, row] = observation.rotation[:, chain].all(axis=1)
+    hips = mapping["Hips"]
+    assert hips is not None
+    found[:, -1] = observation.positions(skeleton)[:, hips]
+    return found
+
+
+def run(
+    path: Path, local: np.ndarray, root: np.ndarray, known: np.ndarray, label: int, bones: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Run the graph on one motion at 30 fps.
+
+    Args:
+        path: of the graph.
+        local: (T, 22, 4) canonical rotations relative to the parent's.
+        root: (T, 3) metres, the hips.
+        known: (T, 23) booleans.
+        label: index of the action.
+        bones: (22, 3) metres.
+
+    Returns:
+        The same rotations and hips, complete; float64.
+    """
+    # Far from the origin float32 would lose millimetres.
+    origin = root[np.argmax(known[:, -1])] * [1.0, 0.0, 1.0]
+    shape = (1, *local.shape[:2])
+    feed = {
+        "local": np.where(known[:, :-1, None], local, [1.0, 0.0, 0.0, 0.0])[None].astype(np.float32),
+        "root": np.where(known[:, -1:], root - origin, 0.0)[None].astype(np.float32),
+        "known": known[None].astype(np.float32),
+        "pinned": np.zeros((*shape, 3), np.float32),
+        "pins": np.zeros(shape, bool),
+        "label": np.array([label]),
+        "bones": bones[None].astype(np.float32),
+    }
+    turned, placed = weights.session(path).run(["local_out", "root_out"], feed)
+    return rotations.normalize(turned[0].astype(float)), placed[0].astype(float) + origin
+
+
+def run_long(
+    card: weights.Card, local: np.ndarray, root: np.ndarray, known: np.ndarray, label: int, bones: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Run the graph on a motion of any length, hole by hole; arguments and result as in `run`.
+
+    A hole is seen with what is around it. Of one that is longer than the network can see, each window
+    completes as much as half of it, which is taken as known from then on.
+    """
+    local, root, known = local.copy(), root.copy(), known.copy()
+    for begin, end in runs(np.logical_not(known.all(axis=1))):
+        while begin < end:
+            short = end - begin <= card.max_gap
+            last = min(end + CONTEXT, len(root)) if short else begin + card.max_gap
+            first = max(begin - CONTEXT, 0)
+            part = slice(first, last)
+            said = run(card.onnx, local[part], root[part], known[part], label, bones)
+            stop = end if short else begin + card.max_gap // 2
+            inside = slice(begin, stop)
+            own = slice(begin - first, stop - first)
+            held = known[inside]
+            local[inside] = np.where(held[:, :-1, None], local[inside], said[0][own])
+            root[inside] = np.where(held[:, -1:], root[inside], said[1][own])
+            known[inside] = True
+            begin = stop
+    return local, root

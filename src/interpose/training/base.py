@@ -1,0 +1,353 @@
+"""The recipe of interpose's own network, `base` and `small`, at 30 fps: every task in one mixture.
+
+What published recipes for in-betweening have in common is in it: gaps as often as they are short (Duan et al.
+2021), joints through forward kinematics and global rotations in the loss (Oreshkin et al. 2022). What is
+settled by trial here is a setting, so that the trial can be repeated: `--set velocities=0` and so on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from torch import Tensor, nn
+from torch.nn import functional
+
+from interpose.datasets import Pack
+from interpose.errors import RequestError, unknown
+from interpose.geometry import kinematics, rotations
+from interpose.methods.weights import Card
+from interpose.models.base import CONFIGS, COUNT, FEET, Answer, Base, BaseConfig, Motion
+from interpose.observation.corruption import LIMBS
+from interpose.skeletons import JOINTS, PARENTS
+from interpose.training.budget import Budget
+from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.poses import Batch, Poses, labels_of
+
+LOWER = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Toe")]
+HANDS_FEET = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Hand", "Foot")]
+ENDS = [*HANDS_FEET, JOINTS.index("Head")]
+# A foot stands that moves by less than this in a frame, in metres (.15 m a second).
+STANDS = 0.005
+# How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
+TASKS: dict[str, dict[str, float]] = {
+    "all": {
+        "gap": 0.44,
+        "gaps": 0.06,
+        "keys": 0.1,
+        "joints": 0.08,
+        "limbs": 0.06,
+        "half": 0.04,
+        "moments": 0.04,
+        "path": 0.03,
+        "pins": 0.05,
+        "forecast": 0.05,
+        "noise": 0.05,
+    },
+    "gap": {"gap": 1.0},
+}
+
+
+@dataclass
+class BaseSettings(Settings):
+    """The recipe."""
+
+    config: str = "small"  # one of CONFIGS
+    tasks: str = "all"  # one of TASKS
+    datasets: str = ""  # names separated by commas; all packs without any
+    batch: int = 64  # of all processes together
+    warm_up: float = 0.03
+    decay: float = 0.01
+    shortest: int = 1  # frames of a gap
+    longest: int = 120
+    short: float = 1.0  # gaps are drawn as often as their length to minus this: 0 for uniformly
+    context: int = 10  # frames before a gap, and after it, at most
+    labelled: float = 0.5  # share of the motions that are told their label
+    noise: float = 0.06  # metres, and radians, of the worst noise
+    mirror: int = 1  # whether half of the motions are mirrored
+    # The network's own settings.
+    dropout: float = 0.0
+    residual: int = 1
+    velocities: int = 1
+    near: int = 1
+    apart: int = 1
+    distances: int = 1
+    width: int = 0  # 0 for the configuration's
+    layers: int = 0
+    # Weights of the losses.
+    position: float = 10.0  # of metres, in the mean over what is missing
+    rotation: float = 5.0  # of matrix entries
+    velocity: float = 10.0  # of metres a frame
+    contact: float = 0.02
+    slide: float = 5.0  # of metres a frame that a standing foot moves
+    risk: float = 0.02
+
+    def __post_init__(self) -> None:
+        if self.config not in CONFIGS:
+            raise unknown("config", self.config, CONFIGS)
+        if self.tasks not in TASKS:
+            raise unknown("tasks", self.tasks, TASKS)
+
+    def network(self, labels: tuple[str, ...]) -> BaseConfig:
+        base = CONFIGS[self.config]
+        return replace(
+            base,
+            labels=labels,
+            dropout=self.dropout,
+            width=self.width or base.width,
+            layers=self.layers or base.layers,
+            residual=bool(self.residual),
+            velocities=bool(self.velocities),
+            near=bool(self.near),
+            apart=bool(self.apart),
+            distances=bool(self.distances),
+        )
+
+
+@dataclass
+class Task:
+    """What is asked of a batch: arrays over (B, T, ...).
+
+    Attributes:
+        known: (B, T, 23) 0 to 1, as the network wants it.
+        pins: (B, T, 22) whose positions are told.
+        noisy: (B,) whose values are noisy.
+    """
+
+    known: np.ndarray
+    pins: np.ndarray
+    noisy: np.ndarray
+
+
+def draw_task(rng: np.random.Generator, settings: BaseSettings, batch: int) -> Task:
+    """Tasks of motions of one length: frames before a gap, the gap and frames after it.
+
+    Most often something is missing in the gap alone; joints and limbs also from one end to the other.
+    """
+    lengths = np.arange(settings.shortest, settings.longest + 1)
+    chance = lengths.astype(float) ** -settings.short
+    gap = int(rng.choice(lengths, p=chance / chance.sum()))
+    before = int(rng.integers(1, settings.context + 1)) if rng.random() < 0.5 else settings.context
+    after = 1 if rng.random() < 0.5 else int(rng.integers(1, settings.context + 1))
+    count = before + gap + after
+    hole = slice(before, before + gap)
+    known, pins = np.ones((batch, count, COUNT + 1), np.float32), np.zeros((batch, count, COUNT), bool)
+    noisy = np.zeros(batch, bool)
+    kinds = list(TASKS[settings.tasks])
+    odds = np.array([TASKS[settings.tasks][kind] for kind in kinds])
+    for i, kind in enumerate(rng.choice(kinds, batch, p=odds / odds.sum())):
+        part = slice(None) if kind in ("joints", "limbs", "half") and rng.random() < 0.5 else hole
+        if kind in ("gap", "path", "pins"):
+            known[i, hole] = 0
+            if kind == "path":
+                known[i, hole, COUNT] = 1
+            elif kind == "pins":
+                chosen = rng.permutation(ENDS)[: rng.integers(1, len(ENDS) + 1)]
+                frames = np.flatnonzero(rng.random(gap) < rng.choice([1.0, 1.0, 0.1])) + before
+                pins[i, frames[:, None], chosen] = True
+        elif kind == "gaps":
+            known[i, before : count - 1] = (rng.random(count - 1 - before) < 0.3)[:, None]
+        elif kind == "keys":
+            known[i, : count - 1] = 0
+            known[i, [0, count - 1]] = 1
+            known[i, rng.integers(count, size=rng.integers(0, 2 + gap // 12))] = 1
+        elif kind == "joints":
+            # Hips' rotation is the first column: it goes with the rest of the pose alone.
+            lost = 1 + rng.permutation(COUNT - 1)[: rng.integers(1, 4)]
+            known[i, part, lost[:, None]] = 0
+        elif kind == "limbs":
+            for limb in rng.permutation(4)[: rng.integers(1, 3)]:
+                known[i, part, np.array(LIMBS[limb])[:, None]] = 0
+        elif kind == "half":
+            lower = rng.random() < 0.5
+            half = np.array([j for j in range(1, COUNT) if (j in LOWER) == lower])
+            known[i, part, half[:, None]] = 0
+        elif kind == "moments":
+            known[i, :, 1:COUNT] = rng.random((count, COUNT - 1)) >= rng.uniform(0.1, 0.5)
+        elif kind == "forecast":
+            known[i, before:] = 0
+        else:
+            known[i] = 0.5
+            noisy[i] = True
+        if (known[i] == 1).all():  # by chance, in short windows
+            known[i, hole] = 0
+    return Task(known, pins, noisy)
+
+
+def draw_batch(
+    rng: np.random.Generator, poses: Poses, settings: BaseSettings, batch: int
+) -> tuple[Batch, Task]:
+    """Motions, and what is asked of each."""
+    task = draw_task(rng, settings, batch)
+    drawn = poses.draw(rng, batch, task.known.shape[1], mirror=bool(settings.mirror))
+    unsaid = torch.from_numpy(rng.random(batch) >= settings.labelled).to(poses.device)
+    drawn.label = torch.where(unsaid, 0, drawn.label)
+    return drawn, task
+
+
+def ask(
+    model: Base, drawn: Batch, task: Task, settings: BaseSettings, seed: int
+) -> tuple[Answer, Motion, Tensor]:
+    """What the network answers, the truth, and where its joints are (B, T, 22, 3)."""
+    device = drawn.root.device
+    truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
+    placed = drawn.positions()
+    known, pins, noisy = (torch.from_numpy(some).to(device) for some in (task.known, task.pins, task.noisy))
+    local, root = truth.local, truth.root
+    if task.noisy.any():
+        generator = torch.Generator(device).manual_seed(seed)
+        worst = (
+            settings.noise
+            * torch.rand(len(root), 1, 1, device=device, generator=generator)
+            * noisy[:, None, None]
+        )
+        root = root + worst * torch.randn(root.shape, device=device, generator=generator)
+        turns = torch.randn((*local.shape[:-1], 3), device=device, generator=generator)
+        local = rotations.multiply(local, rotations.exp(worst[..., None] * turns))
+    answer = model.complete(local, root, known, placed, pins, drawn.label, drawn.bones)
+    return answer, truth, placed
+
+
+class Losses:
+    """What is wrong with an answer, as scalars by name."""
+
+    def __init__(self, settings: BaseSettings) -> None:
+        self.settings = settings
+
+    def parts(
+        self, answer: Answer, truth: Motion, placed: Tensor, known: Tensor, bones: Tensor
+    ) -> dict[str, Tensor]:
+        turned, said = answer.motion.forward(bones)
+        true_turned = truth.forward(bones)[0]
+        # Frames in which something is missing; each motion counts the same, however long its gap is.
+        missing = (known < 1).any(dim=2).to(said.dtype)
+        share = missing / missing.sum(dim=1, keepdim=True).clamp(min=1)
+
+        def mean(values: Tensor) -> Tensor:
+            return (values * share).sum(dim=1).mean()
+
+        off = (said - placed).norm(dim=-1)
+        columns = rotations.to_6d(turned) - rotations.to_6d(true_turned)
+        step, true_step = said.diff(dim=1), placed.diff(dim=1)
+        moved = functional.pad((step - true_step).abs().mean(dim=(2, 3)), (1, 0))
+        stands = (true_step[:, :, FEET].norm(dim=-1) < STANDS).to(said.dtype)
+        slid = functional.pad((step[:, :, FEET].norm(dim=-1) * stands).mean(dim=2), (1, 0))
+        contact = functional.binary_cross_entropy_with_logits(
+            answer.contact[:, 1:], stands, reduction="none"
+        ).mean(dim=2)
+        error = off.detach().mean(dim=2)
+        return {
+            "position": mean(off.mean(dim=2) + 0.5 * (said - placed)[:, :, 0].norm(dim=-1)),
+            "rotation": mean(columns.abs().mean(dim=(2, 3))),
+            "velocity": mean(moved),
+            "slide": mean(slid),
+            "contact": contact.mean(),
+            # The likelihood of the error under an exponential distribution of the mean exp(risk).
+            "risk": mean(answer.risk + 100 * error * torch.exp(-answer.risk)),
+        }
+
+    def __call__(self, answer: Answer, truth: Motion, placed: Tensor, known: Tensor, bones: Tensor) -> Tensor:
+        parts = self.parts(answer, truth, placed, known, bones)
+        return torch.stack([getattr(self.settings, name) * part for name, part in parts.items()]).sum()
+
+
+def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:
+    """The packs that are asked for. RequestError for one that is not there."""
+    if not names:
+        return list(packs)
+    held = {str(pack.dataset): pack for pack in packs}
+    if bad := [name for name in names.split(",") if name not in held]:
+        raise RequestError(
+            f"there is no pack of {bad[0]}", f"there are {', '.join(held)}", "Make it: interpose data pack."
+        )
+    return [held[name] for name in names.split(",")]
+
+
+def train_base(
+    packs: Sequence[Pack],
+    folder: Path,
+    budget: Budget,
+    settings: BaseSettings | None = None,
+    splits: Sequence[str] = ("train",),
+    start: Card | None = None,
+    say: Callable[[str], None] = print,
+) -> Base:
+    """Train, or go on training, in `folder`; the averaged model comes back. Arguments as in `train_cae`."""
+    settings = settings or BaseSettings()
+    device = pick_device()
+    torch.manual_seed(settings.seed)
+    packs = chosen(packs, settings.datasets)
+    labels = tuple(start.labels) if start else labels_of(packs, splits)
+    most = settings.longest + 2 * settings.context
+    poses = Poses(packs, splits, labels, most, device)
+    held_out = Poses(packs, ("validation",), labels, most, device).spread(128, 10 + 45 + 1)
+    model = Base(settings.network(labels)).to(device)
+    if start:
+        restore(model, start.onnx)
+    losses, batch = Losses(settings), max(1, settings.batch // processes())
+
+    def loss(rng: np.random.Generator, fraction: float) -> Tensor:
+        drawn, task = draw_batch(rng, poses, settings, batch)
+        with torch.autocast(device.type, torch.bfloat16):
+            answer, truth, placed = ask(model, drawn, task, settings, int(rng.integers(2**31)))
+        known = torch.from_numpy(task.known).to(device)
+        return losses(answer, truth, placed, known, drawn.bones)
+
+    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
+        return torch.optim.AdamW(
+            parameters, settings.learning_rate, (0.9, 0.99), weight_decay=settings.decay, fused=True
+        )
+
+    trainer = Trainer(
+        model,
+        loss,
+        lambda averaged: validate(averaged, held_out),
+        folder,
+        budget,
+        settings,
+        say,
+        optimizer=optimizer,
+        clip=1.0,
+        about={"network": asdict(model.config)},
+    )
+    if start:
+        trainer.follow(start)
+    say(f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}")
+    if trainer.resume():
+        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
+    return trainer.run()
+
+
+@torch.no_grad()
+def validate(model: nn.Module, batch: Batch) -> dict[str, float]:
+    """Joints in cm and global rotations in degrees, after ten known frames and before one, and the ratios to
+    straight lines and great arcs; how well feet and the expected error are told."""
+    assert isinstance(model, Base)
+    figures: dict[str, float] = {}
+    local, placed = kinematics.local_rotations(batch.rotation, PARENTS), batch.positions()
+    plain = Base(replace(model.config, velocities=False)).to(placed.device)
+    for gap in (5, 15, 30, 45):
+        part = slice(0, 10 + gap + 1)
+        inside = slice(10, 10 + gap)
+        known = placed.new_ones(len(placed), part.stop, COUNT + 1)
+        known[:, inside] = 0
+        pins = torch.zeros(known.shape[0], part.stop, COUNT, dtype=torch.bool, device=placed.device)
+        given = (local[:, part], batch.root[:, part], known, placed[:, part], pins)
+        answer = model.complete(*given, torch.zeros_like(batch.label), batch.bones)
+        line = plain.start(*given[:3], batch.bones)
+        turned, said = answer.motion.forward(batch.bones)
+        true = placed[:, part][:, inside]
+        off, base = ((p[:, inside] - true).norm(dim=-1) for p in (said, line.placed))
+        angles, base_angles = (
+            rotations.angle(q[:, inside], batch.rotation[:, part][:, inside]).mean()
+            for q in (turned, line.turned)
+        )
+        figures[f"gap{gap}"] = 100 * float(off.mean())
+        figures[f"ratio{gap}"] = float(off.mean() / base.mean())
+        figures[f"turn_ratio{gap}"] = float(angles / base_angles)
+        expected = torch.exp(answer.risk[:, inside])
+        figures[f"risk{gap}"] = float(expected.mean() / (100 * off.mean()))
+    return figures

@@ -1,0 +1,216 @@
+"""interpose's own network: what it starts from, what stays known, the tasks, the recipe, and the method."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+
+from interpose import tasks  # noqa: E402
+from interpose.errors import RequestError  # noqa: E402
+from interpose.geometry import kinematics, rotations  # noqa: E402
+from interpose.geometry.ground import turn  # noqa: E402
+from interpose.methods import base as method  # noqa: E402
+from interpose.methods import registry, weights  # noqa: E402
+from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns  # noqa: E402
+from interpose.observation import Gap, Observation  # noqa: E402
+from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
+from interpose.training.base import TASKS, BaseSettings, chosen, draw_task, train_base  # noqa: E402
+from interpose.training.budget import Budget  # noqa: E402
+from interpose.training.export import export_base  # noqa: E402
+from interpose.training.poses import Poses, labels_of  # noqa: E402
+
+TINY = BaseConfig(("", "walk"), width=24, heads=2, layers=1, longest=140)
+
+
+@pytest.fixture(scope="module")
+def drawn(walk_pack):  # type: ignore[no-untyped-def]
+    """Two windows of a walk, 40 frames long."""
+    pack = walk_pack("lafan1", both=True)
+    poses = Poses([pack], ("train",), labels_of([pack], ("train",)), 40, torch.device("cpu"))
+    return poses.spread(2, 40)
+
+
+@pytest.fixture(scope="module")
+def given(drawn):  # type: ignore[no-untyped-def]
+    """What the network is given of them, in float64: a gap of 20 frames."""
+    local = kinematics.local_rotations(drawn.rotation.double(), PARENTS)
+    known = torch.ones(2, 40, COUNT + 1, dtype=torch.float64)
+    known[:, 10:30] = 0
+    placed = drawn.positions().double()
+    pins = torch.zeros(2, 40, COUNT, dtype=torch.bool)
+    return [local, drawn.root.double(), known, placed, pins, drawn.label, drawn.bones.double()]
+
+
+@pytest.fixture(scope="module")
+def model():  # type: ignore[no-untyped-def]
+    """As if it had been trained: it says something."""
+    torch.manual_seed(1)
+    made = Base(TINY).double().eval()
+    with torch.no_grad():
+        made.say.weight.normal_(std=0.05)
+    return made
+
+
+def test_sizes():
+    count = {name: sum(p.numel() for p in Base(config).parameters()) for name, config in CONFIGS.items()}
+    assert 2e6 < count["small"] < 4e6
+    assert 15e6 < count["base"] < 25e6
+
+
+def test_the_starting_point_goes_on_as_the_motion_does():
+    """Of a line it is that line, nearer to a cubic than lines; past the end a velocity dies away."""
+    time = torch.arange(30.0, dtype=torch.float64)[None, :, None]
+    known = torch.ones(1, 30, dtype=torch.bool)
+    known[:, 10:20] = False
+    line = 2.0 + 0.3 * time
+    far = torch.full((1,), 1e9, dtype=torch.float64)
+    assert torch.allclose(complete_columns(line, known, far), line)
+    cubic = 0.001 * (time - 14.5) ** 3
+    off = (complete_columns(cubic, known, far) - cubic).abs().max()
+    straight = (complete_columns(cubic, known, None) - cubic).abs().max()
+    assert off < 0.4 * straight
+    known[:, 10:] = False
+    on = complete_columns(line, known, torch.full((1,), 2.0, dtype=torch.float64))[0, 9:, 0].diff()
+    assert on[0] > 0
+    assert on[-1].abs() < 1e-3
+
+
+def test_a_new_network_is_its_starting_point_and_lone_keys_have_no_velocity(given):
+    new = Base(TINY).double()
+    answer = new.complete(*given)
+    start = new.start(*given[:3], given[-1])
+    assert torch.allclose(answer.motion.root, start.motion.root)
+    assert rotations.angle(answer.motion.local, start.motion.local).max() < 1e-6
+    lone = given[2].clone()
+    lone[:, :9], lone[:, 31:] = 0, 0
+    root = new.start(given[0], given[1], lone, given[-1]).motion.root
+    share = torch.linspace(0, 1, 22, dtype=torch.float64)[:, None]
+    assert torch.allclose(root[0, 9:31], given[1][0, 9] + share * (given[1][0, 30] - given[1][0, 9]))
+
+
+def test_what_is_known_stays_and_what_is_not_has_no_influence(model, given):
+    local, root, known, placed, pins, label, bones = given
+    known = known.clone()
+    known[:, 5:, 7] = 0  # a toe, and in the gap the place of the hips alone is known
+    known[:, 10:30, COUNT] = 1
+    answer = model.complete(local, root, known, placed, pins, label, bones).motion
+    held = known[..., :COUNT] == 1
+    assert torch.equal(answer.local[held], local[held])
+    assert torch.equal(answer.root, root)
+    spoiled = torch.where(held[..., None], local, torch.randn_like(local))
+    again = model.complete(spoiled, root, known, torch.full_like(placed, torch.nan), pins, label, bones)
+    assert torch.equal(again.motion.local, answer.local)
+
+
+def test_the_answer_follows_turns_and_moves(model, given):
+    local, root, known, placed, pins, label, bones = given
+    pins = pins.clone()
+    pins[:, 15, 17] = True
+    yaw, away = torch.tensor(1.3, dtype=torch.float64), root.new_tensor([4.0, 0.0, -2.0])
+    answer = model.complete(local, root, known, placed, pins, label, bones).motion
+    moved = local.clone()
+    moved[:, :, 0] = rotations.multiply(rotations.about("Y", yaw), local[:, :, 0])
+    other = model.complete(
+        moved, turn(root, yaw) + away, known, turn(placed, yaw) + away, pins, label, bones
+    ).motion
+    assert torch.allclose(other.root, turn(answer.root, yaw) + away, atol=1e-7)
+    assert rotations.angle(other.local[:, :, 1:], answer.local[:, :, 1:]).max() < 1e-5
+    told = model.complete(local, root, known, placed, torch.zeros_like(pins), label, bones).motion
+    assert not torch.allclose(told.root, answer.root), "pins are seen"
+
+
+def test_noisy_values_may_change(model, given):
+    known = torch.full_like(given[2], 0.5)
+    answer = model.complete(*given[:2], known, *given[3:]).motion
+    assert not torch.allclose(answer.root, given[1])
+
+
+def test_every_task_is_drawn_and_leaves_something_to_go_by():
+    rng, settings = np.random.default_rng(0), BaseSettings()
+    seen = [draw_task(rng, settings, 64) for _ in range(40)]
+    gaps = [int((task.known[:, :, 0] == 0).sum(axis=1).max()) for task in seen]
+    assert min(gaps) < 10 < max(gaps)
+    for task in seen:
+        assert task.known.shape[1] <= settings.longest + 2 * settings.context
+        assert (task.known > 0).any(axis=(1, 2)).all()
+        assert (task.known < 1).any(axis=(1, 2)).all()
+    assert any(task.pins.any() for task in seen)
+    assert any(task.noisy.any() for task in seen)
+    alone = draw_task(rng, BaseSettings(tasks="gap"), 8).known
+    assert (alone == alone[:1]).all()
+    assert set(TASKS) == {"all", "gap"}
+
+
+def test_packs_by_name(walk_pack):
+    packs = [walk_pack("lafan1"), walk_pack("cmu")]
+    assert chosen(packs, "cmu") == packs[1:]
+    assert chosen(packs, "") == packs
+    with pytest.raises(RequestError, match="there is no pack of bandai"):
+        chosen(packs, "bandai")
+
+
+@pytest.fixture(scope="module")
+def trained(walk_pack, tmp_path_factory):  # type: ignore[no-untyped-def]
+    """The card of a network that was trained for a moment, and what was said meanwhile."""
+    folder, pack = tmp_path_factory.mktemp("run"), walk_pack("lafan1", both=True)
+    settings = BaseSettings(width=24, layers=1, batch=4, longest=40, every_seconds=0.0)
+    told: list[str] = []
+    train_base([pack], folder, Budget.parse("4steps"), settings, say=told.append)
+    train_base([pack], folder, Budget.parse("6steps"), settings, say=told.append)
+    export_base(folder, [pack], folder / "weights", ["train"])
+    return weights.load(folder / "weights", "small"), folder, told
+
+
+def test_a_run_goes_on_and_is_exported_whole(trained, given):
+    card, folder, told = trained
+    assert any("goes on at 67 %" in line for line in told)
+    log = [json.loads(line) for line in (folder / "log.jsonl").read_text().splitlines()]
+    assert log[-1]["step"] == 6
+    assert all(np.isfinite(value) for entry in log for value in entry.values())
+    assert card.licence.startswith("research")
+
+    network = {**card.training["network"], "labels": tuple(card.labels)}
+    model = Base(BaseConfig(**network))
+    model.load_state_dict(torch.load(folder / "averaged.pt", weights_only=True))
+    with torch.no_grad():
+        for value in model.parameters():
+            if value.numel() >= 1024:  # stored in 16 bits
+                value.copy_(value.half())
+        expected = model(*(v.float() if v.is_floating_point() else v for v in given))
+    local, root, known, *_, bones = (v[0].numpy() for v in given)
+    said = method.run(card.onnx, local, root, known == 1, int(given[5][0]), bones)
+    assert rotations.angle(said[0], expected[0][0].double().numpy()).max() < 1e-3
+    assert np.allclose(said[1], expected[1][0], atol=1e-4)
+
+
+def test_it_completes_clips(trained, cmu_walk, monkeypatch):
+    """Gaps, joints of the whole clip, and forecasts that are longer than it can see."""
+    small = method.Base("small", trained=trained[0])
+    monkeypatch.setattr(registry, "get", lambda name: small)
+    done = tasks.fill(cmu_walk, [Gap(60, 80)], "small")
+    assert done.report.gaps[0].model == "small"
+    left = np.r_[0:60, 80 : len(cmu_walk)]
+    assert np.array_equal(done.clip.rotation[left], cmu_walk.rotation[left])
+    lost = tasks.recover(cmu_walk, ["LeftArm", "LeftForeArm"], method="small")
+    others = [j for j, name in enumerate(cmu_walk.skeleton.names) if name not in ("LeftArm", "LeftForeArm")]
+    assert np.array_equal(lost.clip.rotation[:, others], cmu_walk.rotation[:, others])
+    assert len(tasks.forecast(cmu_walk, 150, method="small").clip) == len(cmu_walk) + 150
+    assert "more than the 40" in small.refuses(cmu_walk, Gap(50, 100))
+    assert small.for_action("walk").action == "walk"
+    with pytest.raises(RequestError, match="unknown action"):
+        small.for_action("fly")
+
+
+def test_knowledge_of_canonical_rotations(cmu_walk):
+    mapping = find_mapping(cmu_walk.skeleton)
+    seen = Observation.from_gaps(cmu_walk, [Gap(5, 9, ("LeftForeArm",)), Gap(20, 22)])
+    known = method.knowledge(seen, mapping)
+    row = mapping.joints.index(cmu_walk.skeleton.index("LeftForeArm"))
+    assert not known[5:9, row].any()
+    assert known[5:9, np.arange(COUNT + 1) != row].all()
+    assert not known[20:22][:, [*mapping.mapped[0], COUNT]].any()
+    assert known[22:].all()
