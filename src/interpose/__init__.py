@@ -184,6 +184,8 @@ def denoise(
     *,
     joints: str | Sequence[str] | None = None,
     frames: str | tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost: joints that snap to their rest pose, spikes.
 
@@ -195,6 +197,8 @@ def denoise(
         strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
         joints: names of the joints that may turn, of a root that moves, too; None for all.
         frames: "120:160" or (120, 160); the noise is estimated from these. None for all.
+        method: what fills values that were lost, one of `method_names()`; "auto" interpolates.
+        seed: for methods that sample.
 
     Returns:
         The completion: `.report.noise` says how noisy the clip was and what was done, `.provenance` where
@@ -212,6 +216,8 @@ def denoise(
         strength,
         [joints] if isinstance(joints, str) else joints,
         (chosen.start, chosen.stop) if chosen else None,
+        method,
+        seed,
     )
 
 

@@ -228,6 +228,8 @@ def denoise(
     strength: float = 1.0,
     joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
 
@@ -236,6 +238,8 @@ def denoise(
         strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
         joints: the joints that may turn, roots among them that move, too; None for all.
         frames: the range in which anything may change, from which the noise is estimated, too.
+        method: what fills values that were lost; "auto" interpolates, which is best for moments.
+        seed: for methods that sample.
 
     Raises:
         RequestError: too few frames, a strength below 0 or above 100, a joint or range that does not exist.
@@ -250,7 +254,12 @@ def denoise(
     if frames is not None:
         Gap(start, stop).check(len(clip))
     chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
-    return denoised(clip, strength, chosen, start, stop)
+    if method == "auto":
+        return denoised(clip, strength, chosen, start, stop)
+    registry.get(method)
+    return denoised(
+        clip, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
+    )
 
 
 def between(

@@ -300,6 +300,39 @@ def context(
 
 
 @bench.command
+def recipes(
+    *runs: Annotated[Path, Parameter(name="RUNS")],
+    json: bool = False,
+    markdown: bool = False,
+) -> None:
+    """Training runs beside each other: what their recipes differ in, and what each reached.
+
+    For ablations at an equal budget, on validation performers, as the runs measured it themselves.
+
+    Try:
+      interpose train cae --out runs/l1 --budget 1200steps
+      interpose train cae --out runs/l2 --budget 1200steps --set loss=l2
+      interpose bench recipes runs/l1 runs/l2
+
+    Args:
+        runs: folders that interpose train wrote; the first is what the others are compared with.
+        json: print JSON for other programs.
+        markdown: print only the table, in Markdown.
+    """
+    from interpose.evaluation.recipes import compare
+
+    if not runs:
+        raise RequestError(
+            "no runs are named", "there is nothing to compare", "Name folders: runs/l1 runs/l2."
+        )
+    result = compare(runs)
+    if json:
+        say_json(result.to_dict())
+    else:
+        say(result.table() if markdown else str(result))
+
+
+@bench.command
 def representations(
     *,
     weights: list[Path] = [],  # noqa: B006

@@ -22,6 +22,8 @@ def denoise(
     strength: float = 1.0,
     joints: list[str] = [],  # noqa: B006
     frames: str | None = None,
+    method: str = "auto",
+    seed: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     player: bool = False,
     json: bool = False,
@@ -43,25 +45,30 @@ def denoise(
         strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
         frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0. All without it.
+        method: what fills lost values: auto (interpolates), stmi-gan, ...; `interpose models` lists them.
+        seed: for methods that sample.
         output: where to write the clip; the report goes beside it.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import range_of
+    from interpose.cli.request import check_method, range_of
 
     chosen = split_names(joints)
     if joints and not chosen:
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
+    check_method(method)
     part = range_of(frames) if frames is not None else None
     clip = reading.load(file)
     outputs = Outputs.choose(file, output, "denoised", player)
     outputs.check(file, force)
     with progress(f"denoising {file.name}", len(clip)):
-        done = tasks.denoise(clip, strength, chosen or None, (part.start, part.stop) if part else None)
+        done = tasks.denoise(
+            clip, strength, chosen or None, (part.start, part.stop) if part else None, method, seed
+        )
     more = {"denoised": done.report.to_dict()["denoised"]}
     report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)
     report["units"] = UNITS

@@ -8,7 +8,7 @@ the skeleton's own bones are solved back into those.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy import ndimage
@@ -52,8 +52,17 @@ SHAKY, AROUND, FAR = 0.005, 3, 2.5
 BLEND = 0.2
 
 
+def _interpolated(clip: Clip, seen: Observation) -> Clip:
+    return Spline().complete(clip, seen).clip
+
+
 def denoised(
-    clip: Clip, strength: float, joints: Sequence[int] | None = None, start: int = 0, stop: int | None = None
+    clip: Clip,
+    strength: float,
+    joints: Sequence[int] | None = None,
+    start: int = 0,
+    stop: int | None = None,
+    fill: Callable[[Clip, Observation], Clip] = _interpolated,
 ) -> Completion:
     """Fill what is broken and smooth what is noisy. Bones keep their lengths.
 
@@ -62,6 +71,7 @@ def denoised(
         strength: what the estimated noise is multiplied with; 0 changes nothing, not even what is broken.
         joints: those whose rotations, and positions as far as they carry the body, may change; None for all.
         start, stop: frames start to stop - 1 may change; the noise is estimated from them.
+        fill: completes a clip of which broken values are not observed.
 
     Raises:
         RequestError: the range is too short.
@@ -77,7 +87,7 @@ def denoised(
     free = _free(cut, joints)
     whole = broken(cut)
     seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
-    filled = cut if seen.complete else Spline().complete(cut, seen).clip
+    filled = cut if seen.complete else fill(cut, seen)
     noise = deviation(filled.positions())
     done = cut
     if strength > 0:

@@ -1,0 +1,48 @@
+"""Runs beside each other: what differs, what they reached, and folders that are none."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from interpose.errors import FileError
+from interpose.evaluation.recipes import compare
+
+
+@pytest.fixture
+def runs(tmp_path):
+    """Two runs that differ in the loss, and in what does not count."""
+    for name, settings, error in (
+        ("plain", {"loss": "l1", "batch": 32, "commit": "a", "network": {"width": 3}}, 7.5),
+        ("squared", {"loss": "l2", "batch": 32, "commit": "b", "network": {"width": 3}}, 8.25),
+    ):
+        folder = tmp_path / name
+        folder.mkdir()
+        (folder / "settings.json").write_text(json.dumps(settings))
+        entries = [{"step": n, "hours": n / 100, "fraction": 1, "loss": 0.5, "gap15": error} for n in (5, 10)]
+        (folder / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in entries))
+    return [tmp_path / "plain", tmp_path / "squared"]
+
+
+def test_what_differs_and_what_came_of_it(runs):
+    result = compare(runs)
+    assert [result.differs(run) for run in result.runs] == [{}, {"loss": "l2"}]
+    assert result.figures == ["gap15"]
+    plain, squared = result.table().splitlines()[2:]
+    assert plain == "| plain | - | 10 | 0.10 | 7.5 |"
+    assert squared == "| squared | loss=l2 | 10 | 0.10 | 8.25 |"
+    assert result.to_dict()["runs"][1]["gap15"] == 8.25
+
+
+@pytest.mark.parametrize("spoil", ["no log", "empty", "no json", "another file", "no folder"])
+def test_what_is_no_run(runs, spoil):
+    log = runs[1] / "log.jsonl"
+    if spoil == "no log":
+        log.unlink()
+    elif spoil == "no folder":
+        runs[1] = runs[1] / "deeper"
+    else:
+        log.write_text({"empty": "", "no json": "{", "another file": "[1, 2]\n"}[spoil])
+    with pytest.raises(FileError, match="cannot read the run"):
+        compare(runs)
