@@ -249,12 +249,18 @@ class Generator(nn.Module):
         """How many images of noise a motion takes."""
         return 2 * len(self.config.channels) * self.config.blocks
 
-    def aligned(self, motion: Tensor, observed: Tensor, noise: Tensor) -> Tensor:
-        """The same as `forward` on motions that are aligned already."""
+    def write(self, motion: Tensor, observed: Tensor) -> Tensor:
+        """What the frame encoder writes of aligned motions: (B, rows, width)."""
         x = torch.where(observed, (motion - self.mean) / self.std, 0.0)
         given = torch.cat([x.flatten(2), observed.flatten(2).to(x.dtype)], dim=2)
-        layout = (self.config.rows, self.config.together)
-        image = self.encoder(given.unflatten(1, layout).flatten(2))[:, None]
+        written: Tensor = self.encoder(
+            given.unflatten(1, (self.config.rows, self.config.together)).flatten(2)
+        )
+        return written
+
+    def aligned(self, motion: Tensor, observed: Tensor, noise: Tensor) -> Tensor:
+        """The same as `forward` on motions that are aligned already."""
+        image = self.write(motion, observed)[:, None]
         for block, part in zip(self.blocks, noise.chunk(self.config.blocks, dim=1)):
             image = block(image, part)
         said = self.decoder(image[:, 0])

@@ -333,6 +333,15 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
     return figures
 
 
+def trained(card: Card) -> Generator:
+    """The network of some weights, back from the graph that they were exported into."""
+    held = card.training["network"]
+    config = {name: tuple(value) if isinstance(value, list) else value for name, value in held.items()}
+    model = Generator(StmiGanConfig(**config))
+    restore(model, card.onnx)
+    return model.eval()
+
+
 def _stir(motion: Tensor) -> Tensor:
     """Mean step of joints relative to the hips."""
     return (motion - motion[:, :, :1]).diff(dim=1).norm(dim=-1).mean()
