@@ -529,6 +529,7 @@ def _survey(
 @bench.command
 def occlusion(
     *,
+    weights: list[Path] = [],  # noqa: B006
     drawn: Literal["exact", "code"] = "exact",
     most: int | None = None,
     asked: Tabled = Tabled(),
@@ -540,15 +541,21 @@ def occlusion(
 
     Try:
       interpose bench occlusion --data data --split test
+      interpose bench occlusion --weights runs/nogan/weights
 
     Args:
+        weights: a folder that `interpose export stmi-gan` wrote of the configuration dense; may be repeated.
+            The installed ones are a row in any case.
         drawn: exact; or code, as the public code draws: with replacement, so that about 55 % is lost.
         most: windows of each data set; all without it.
     """
-    from interpose.evaluation.occlusion import run
+    from interpose.evaluation.occlusion import networks, run
+    from interpose.methods.weights import cards, load
 
+    trained = [card for card in cards() if card.method == "stmi-gan"]
+    trained += [load(folder, "stmi-gan") for folder in weights]
     with _bar() as progress:
-        result = run(asked.data, asked.split, drawn, most, progress)
+        result = run(asked.data, asked.split, drawn, most, progress, networks(trained))
     _show(result, asked)
 
 

@@ -20,11 +20,13 @@ from typing import Any
 
 import numpy as np
 
-from interpose.errors import unknown
+from interpose.errors import RequestError, unknown
+from interpose.evaluation.forecasting import named
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import windows
-from interpose.methods import cae, weights
+from interpose.methods import cae, stmi_gan, weights
 from interpose.methods.kalman import smooth
+from interpose.methods.weights import Card
 from interpose.observation import corruption
 from interpose.skeletons import JOINTS
 
@@ -57,6 +59,28 @@ def autoencoder(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
     observed = np.all(known, axis=-1)
     _, _, completed = cae.run(weights.find("cae").onnx, positions[None], observed[None])
     return completed[0]
+
+
+def inpainting(card: Card) -> Row:
+    """STMI-GAN without noise, settled into joints that are known. RequestError for one that does not see 4 s
+    at 30 fps frame by frame."""
+    frames = card.training["network"]["frames"]
+    if frames != FRAMES:
+        raise RequestError(
+            f"cannot measure {card.path.parent}",
+            f"it sees {frames} frames, and windows have {FRAMES}",
+            "Name weights of the configuration dense.",
+        )
+
+    def fill(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
+        return stmi_gan.run(card, positions[None], known[None])[1][0]
+
+    return fill
+
+
+def networks(cards: Sequence[Card]) -> dict[str, Row]:
+    """A row for each of some weights of STMI-GAN, named as in table 1."""
+    return {name: inpainting(row.card) for name, row in named(cards).items() if row.card}
 
 
 ROWS: dict[str, Row] = {"linear": linear, "kalman": kalman, "cae": autoencoder}

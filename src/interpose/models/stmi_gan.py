@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from typing import Any
 
 import torch
 from torch import Tensor, nn
@@ -46,6 +47,11 @@ class StmiGanConfig:
     blocks: int = 4
     channels: tuple[int, ...] = (32, 64, 96)
     branches: tuple[str, ...] = BRANCHES
+
+    @classmethod
+    def of(cls, held: dict[str, Any]) -> StmiGanConfig:
+        """The configuration that a card holds."""
+        return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in held.items()})
 
     @property
     def rows(self) -> int:

@@ -290,11 +290,7 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
 def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder."""
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
-    network: dict[str, Any] = {
-        name: tuple(value) if isinstance(value, list) else value
-        for name, value in settings["network"].items()
-    }
-    config = StmiGanConfig(**network)
+    config = StmiGanConfig.of(settings["network"])
     model = Generator(config)
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)

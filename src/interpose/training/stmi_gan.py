@@ -335,9 +335,7 @@ def validate(model: nn.Module, positions: Tensor) -> dict[str, float]:
 
 def trained(card: Card) -> Generator:
     """The network of some weights, back from the graph that they were exported into."""
-    held = card.training["network"]
-    config = {name: tuple(value) if isinstance(value, list) else value for name, value in held.items()}
-    model = Generator(StmiGanConfig(**config))
+    model = Generator(StmiGanConfig.of(card.training["network"]))
     restore(model, card.onnx)
     return model.eval()
 
