@@ -51,7 +51,10 @@ class StmiGanConfig:
     @classmethod
     def of(cls, held: dict[str, Any]) -> StmiGanConfig:
         """The configuration that a card holds."""
-        return cls(**{name: tuple(v) if isinstance(v, list) else v for name, v in held.items()})
+        values: dict[str, Any] = {
+            name: tuple(value) if isinstance(value, list) else value for name, value in held.items()
+        }
+        return cls(**values)
 
     @property
     def rows(self) -> int:
