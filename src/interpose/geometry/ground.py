@@ -19,6 +19,6 @@ def wrap(angles: Array) -> Array:
 def turn(vectors: Array, yaw: Array) -> Array:
     """Vectors (..., 3) turned about Y by `yaw` (...) radians; positive from Z towards X."""
     xp = array_namespace(vectors, yaw)
-    x, y, z = (vectors[..., i] for i in range(3))
+    x, y, z = xp.unstack(vectors, axis=-1)
     cosine, sine = xp.cos(yaw), xp.sin(yaw)
     return xp.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=-1)

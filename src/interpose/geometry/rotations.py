@@ -39,8 +39,9 @@ def normalize(q: Array) -> Array:
 def multiply(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4): the rotation `b` followed by `a`."""
     xp = array_namespace(a, b)
-    aw, ax, ay, az = (a[..., i] for i in range(4))
-    bw, bx, by, bz = (b[..., i] for i in range(4))
+    # At once: the gradient of a value that is picked alone is an array of zeros with one value in it.
+    aw, ax, ay, az = xp.unstack(a, axis=-1)
+    bw, bx, by, bz = xp.unstack(b, axis=-1)
     return xp.stack(
         [
             aw * bw - ax * bx - ay * by - az * bz,
@@ -61,8 +62,8 @@ def conjugate(q: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Cross product of (..., 3) vectors, broadcasting."""
     xp = array_namespace(a, b)
-    a0, a1, a2 = (a[..., i] for i in range(3))
-    b0, b1, b2 = (b[..., i] for i in range(3))
+    a0, a1, a2 = xp.unstack(a, axis=-1)
+    b0, b1, b2 = xp.unstack(b, axis=-1)
     return xp.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
@@ -128,7 +129,7 @@ def slerp(a: Array, b: Array, t: Array) -> Array:
 def to_matrix(q: Array) -> Array:
     """Unit quaternion (..., 4) to rotation matrix (..., 3, 3), for column vectors."""
     xp = array_namespace(q)
-    w, x, y, z = (q[..., i] for i in range(4))
+    w, x, y, z = xp.unstack(q, axis=-1)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -143,23 +144,15 @@ def from_matrix(m: Array) -> Array:
     Of the four ways to write the quaternion the best conditioned one is taken (Shepperd 1978).
     """
     xp = array_namespace(m)
-    m00, m11, m22 = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
-    a, b, c = m[..., 2, 1] - m[..., 1, 2], m[..., 0, 2] - m[..., 2, 0], m[..., 1, 0] - m[..., 0, 1]
-    d, e, f = m[..., 1, 0] + m[..., 0, 1], m[..., 0, 2] + m[..., 2, 0], m[..., 2, 1] + m[..., 1, 2]
-    candidates = xp.stack(
-        [
-            xp.stack([1 + m00 + m11 + m22, a, b, c], axis=-1),
-            xp.stack([a, 1 + m00 - m11 - m22, d, e], axis=-1),
-            xp.stack([b, d, 1 - m00 + m11 - m22, f], axis=-1),
-            xp.stack([c, e, f, 1 - m00 - m11 + m22], axis=-1),
-        ],
-        axis=-2,
-    )
-    diagonal = xp.stack([candidates[..., i, i] for i in range(4)], axis=-1)
-    best = xp.argmax(diagonal, axis=-1)[..., None]
-    q = candidates[..., 0, :]
-    for i in range(1, 4):
-        q = xp.where(best == i, candidates[..., i, :], q)
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = xp.unstack(xp.reshape(m, (*m.shape[:-2], 9)), axis=-1)
+    a, b, c = m21 - m12, m02 - m20, m10 - m01
+    d, e, f = m10 + m01, m02 + m20, m21 + m12
+    diagonal = [1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22]
+    best = xp.argmax(xp.stack(diagonal, axis=-1), axis=-1)[..., None]
+    w, x, y, z = diagonal
+    q = xp.stack([w, a, b, c], axis=-1)
+    for i, candidate in enumerate(([a, x, d, e], [b, d, y, f], [c, e, f, z]), 1):
+        q = xp.where(best == i, xp.stack(candidate, axis=-1), q)
     q = normalize(q)
     return xp.where(q[..., :1] < 0, -q, q)
 
