@@ -15,7 +15,7 @@ from interpose.geometry import kinematics, rotations  # noqa: E402
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods import base as method  # noqa: E402
 from interpose.methods import registry, weights  # noqa: E402
-from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns  # noqa: E402
+from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns, room  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
 from interpose.training.base import TASKS, BaseSettings, chosen, draw_task, train_base  # noqa: E402
@@ -51,7 +51,7 @@ def model():  # type: ignore[no-untyped-def]
     torch.manual_seed(1)
     made = Base(TINY).double().eval()
     with torch.no_grad():
-        made.say.weight.normal_(std=0.05)
+        made.encoder.say.weight.normal_(std=0.05)
     return made
 
 
@@ -77,6 +77,16 @@ def test_the_starting_point_goes_on_as_the_motion_does():
     on = complete_columns(line, known, torch.full((1,), 2.0, dtype=torch.float64))[0, 9:, 0].diff()
     assert on[0] > 0
     assert on[-1].abs() < 1e-3
+
+
+def test_there_is_no_room_at_known_frames_and_all_of_it_far_away():
+    known = torch.tensor([[1, 1, 0, 0, 0, 1, 0, 0], [1, 0, 1, 1, 1, 1, 1, 1], [0] * 8, [0.5] * 8])
+    gap, short, nothing, noisy = room(known)
+    assert (gap[known[0] == 1] == 0).all()
+    assert gap[3] > gap[2] == gap[4] > short[1] > 0
+    assert gap[7] > gap[6] > gap[2]
+    assert (nothing == 1).all()
+    assert (noisy == 0.5).all()
 
 
 def test_a_new_network_is_its_starting_point_and_lone_keys_have_no_velocity(given):

@@ -35,6 +35,11 @@ REACH_TURN, REACH_WAY = 20.0, 45.0
 # what is known, pins and whether there are any, and how near known frames are.
 SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
 
+# Numbers that it says of a frame: columns of rotations, hips, contacts of the feet, and the risk.
+SAID = [6 * COUNT, 3, len(FEET), 1]
+NEAR = 4.0  # frames from known ones at which half of what is said is added
+LENGTH = 5.0  # what lengths of bones (m) are multiplied with
+
 
 @dataclass(frozen=True)
 class BaseConfig:
@@ -51,6 +56,7 @@ class BaseConfig:
         near: whether the motion is seen from the last known pose; else from the first frame.
         apart: whether attention has a learned part for how far two frames are apart.
         distances: whether the network is told how far known frames are.
+        room: whether what it says counts less near known frames, where the starting point is good.
     """
 
     labels: tuple[str, ...] = ("",)
@@ -64,6 +70,7 @@ class BaseConfig:
     near: bool = True
     apart: bool = True
     distances: bool = True
+    room: bool = True
 
 
 SMALL = BaseConfig()
@@ -120,6 +127,22 @@ def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Ten
         + leave * since * (1 - share) ** 2 * torch.exp(-since / reach)
         - meet * until * share**2 * torch.exp(-until / reach)
     )
+
+
+def room(known: Tensor) -> Tensor:
+    """How much may be added to the starting point: 0 at frames (N, T) that are known exactly, to 1 far away.
+
+    The starting point is as good as its neighbours are near: so the network, whose answers are all of about
+    one size, need not learn to keep still beside them. What is noisy may always change.
+    """
+    held = known > 0
+    last, first = neighbours(held)
+    frame = torch.arange(known.shape[1], device=known.device)
+    since, until = (d.clamp(min=0).to(known.dtype) for d in (frame - last, first - frame))
+    # Between two known frames half their harmonic mean, at open ends the distance to the only one.
+    away = torch.where(first > last, since * until / (since + until).clamp(min=1.0), since + until)
+    share = torch.where(held.any(dim=1, keepdim=True), away / (away + NEAR), 1.0)
+    return torch.where(held & (known < 1), 0.5, share)
 
 
 class Block(nn.Module):
@@ -179,23 +202,42 @@ class Answer:
     risk: Tensor
 
 
-class Base(nn.Module):
-    """Part of a motion in, all of it out. Values that are not known may be anything finite."""
+class Encoder(nn.Module):
+    """The transformer: what is seen of each frame (B, T, SEEN) to what is said of it (B, T, SAID)."""
 
-    def __init__(self, config: BaseConfig = SMALL) -> None:
+    def __init__(self, config: BaseConfig) -> None:
         super().__init__()
-        self.config = config
         width = config.width
         self.see = nn.Linear(SEEN, width)
         self.body = nn.Linear(3 * COUNT, width)
         self.label = nn.Embedding(len(config.labels), width)
         self.blocks = nn.ModuleList(Block(width, config.heads, config.dropout) for _ in range(config.layers))
         self.norm = nn.LayerNorm(width)
-        self.say = nn.Linear(width, 6 * COUNT + 3 + len(FEET) + 1)
-        self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1))
+        self.say = nn.Linear(width, sum(SAID))
+        self.apart = nn.Parameter(torch.zeros(config.heads, 2 * config.longest - 1)) if config.apart else None
         nn.init.zeros_(self.say.weight)
         nn.init.zeros_(self.say.bias)
         nn.init.zeros_(self.label.weight)
+
+    def forward(self, seen: Tensor, label: Tensor, bones: Tensor) -> Tensor:
+        x = self.see(seen) + (self.body(LENGTH * bones.flatten(1)) + self.label(label))[:, None]
+        bias = None
+        if self.apart is not None:
+            frame = torch.arange(seen.shape[1], device=x.device)
+            bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
+        for block in self.blocks:
+            x = block(x, bias)
+        said: Tensor = self.say(self.norm(x))
+        return said
+
+
+class Base(nn.Module):
+    """Part of a motion in, all of it out. Values that are not known may be anything finite."""
+
+    def __init__(self, config: BaseConfig = SMALL) -> None:
+        super().__init__()
+        self.config = config
+        self.encoder = Encoder(config)
 
     def start(self, local: Tensor, root: Tensor, known: Tensor, bones: Tensor) -> Start:
         """The classical completion of what is known; arguments as in `complete`."""
@@ -270,38 +312,37 @@ class Base(nn.Module):
             label: (B,) index into the configuration's labels; 0 for none.
             bones: (B, 22, 3) metres.
         """
-        config, count = self.config, local.shape[1]
         start = self.start(local, root, known, bones)
-        x = self.see(self.features(start, known, pinned, pins))
-        x = x + (self.body(5 * bones.flatten(1)) + self.label(label))[:, None]
-        bias = None
-        if config.apart:
-            frame = torch.arange(count, device=x.device)
-            bias = self.apart[:, frame[:, None] - frame + config.longest - 1]
-        for block in self.blocks:
-            x = block(x, bias)
-        said = self.say(self.norm(x)).to(start.motion.root.dtype)
-        columns, moved, contact, risk = said.split([6 * COUNT, 3, len(FEET), 1], dim=2)
+        said = self.encoder(self.features(start, known, pinned, pins), label, bones)
+        return self.answer(start, said, local, known)
 
+    def answer(self, start: Start, said: Tensor, local: Tensor, known: Tensor) -> Answer:
+        """What is said (B, T, SAID) of the starting point, as a motion; other arguments as in `complete`."""
+        config = self.config
+        columns, moved, contact, risk = said.to(start.motion.root.dtype).split(SAID, dim=2)
         exactly = known >= 1
+        open_ = torch.where(exactly, 0.0, 1.0)
+        if config.room and config.residual:
+            open_ = room(known.transpose(1, 2).flatten(0, 1)).unflatten(0, (len(known), -1)).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
-        above = exactly[..., :COUNT].clone()
+        shares = list(open_[..., :COUNT].unbind(2))
         for joint, parent in enumerate(PARENTS):
             if parent >= 0:
-                above[..., joint] = above[..., joint] & above[..., parent]
+                shares[joint] = torch.maximum(shares[joint], shares[parent])
+        share = torch.stack(shares, dim=2)[..., None]
         ahead = rotations.about("Y", -start.yaw)[:, None, None]
         begin = rotations.to_6d(rotations.multiply(ahead, start.turned))
         columns = columns.unflatten(2, (COUNT, 6))
         if not config.residual:
             columns = columns + columns.new_tensor([1.0, 0, 0, 0, 1.0, 0]) - begin
-        turned = rotations.from_6d(begin + torch.where(above[..., None], 0.0, columns))
+        turned = rotations.from_6d(begin + share * columns)
         turned = rotations.multiply(rotations.conjugate(ahead), turned)
         turned = kinematics.local_rotations(turned, PARENTS)
         turned = torch.where(exactly[..., :COUNT, None], local, turned)
         way = turn(moved, start.yaw[:, None])
         if not config.residual:
             way = way + start.origin[:, None] - start.motion.root
-        placed = start.motion.root + torch.where(exactly[..., COUNT:], 0.0, way)
+        placed = start.motion.root + open_[..., COUNT:] * way
         return Answer(Motion(turned, placed), contact, risk[..., 0])
 
     def forward(

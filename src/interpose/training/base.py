@@ -30,6 +30,7 @@ from interpose.training.poses import Batch, Poses, labels_of
 LOWER = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Toe")]
 HANDS_FEET = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Hand", "Foot")]
 ENDS = [*HANDS_FEET, JOINTS.index("Head")]
+SHORTEST = 30  # frames; clips that are shorter are left out
 # A foot stands that moves by less than this in a frame, in metres (.15 m a second).
 STANDS = 0.005
 # How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
@@ -75,6 +76,7 @@ class BaseSettings(Settings):
     near: int = 1
     apart: int = 1
     distances: int = 1
+    room: int = 1
     width: int = 0  # 0 for the configuration's
     layers: int = 0
     # Weights of the losses.
@@ -104,6 +106,7 @@ class BaseSettings(Settings):
             near=bool(self.near),
             apart=bool(self.apart),
             distances=bool(self.distances),
+            room=bool(self.room),
         )
 
 
@@ -207,8 +210,11 @@ def ask(
         root = root + worst * torch.randn(root.shape, device=device, generator=generator)
         turns = torch.randn((*local.shape[:-1], 3), device=device, generator=generator)
         local = rotations.multiply(local, rotations.exp(worst[..., None] * turns))
-    answer = model.complete(local, root, known, placed, pins, drawn.label, drawn.bones)
-    return answer, truth, placed
+    start = model.start(local, root, known, drawn.bones)
+    seen = model.features(start, known, placed, pins)
+    with torch.autocast(device.type, torch.bfloat16):
+        said = model.encoder(seen, drawn.label, drawn.bones)
+    return model.answer(start, said, local, known), truth, placed
 
 
 class Losses:
@@ -281,9 +287,8 @@ def train_base(
     torch.manual_seed(settings.seed)
     packs = chosen(packs, settings.datasets)
     labels = tuple(start.labels) if start else labels_of(packs, splits)
-    most = settings.longest + 2 * settings.context
-    poses = Poses(packs, splits, labels, most, device)
-    held_out = Poses(packs, ("validation",), labels, most, device).spread(128, 10 + 45 + 1)
+    poses = Poses(packs, splits, labels, SHORTEST, device)
+    held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, 10 + 45 + 1)
     model = Base(settings.network(labels)).to(device)
     if start:
         restore(model, start.onnx)
@@ -291,8 +296,7 @@ def train_base(
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         drawn, task = draw_batch(rng, poses, settings, batch)
-        with torch.autocast(device.type, torch.bfloat16):
-            answer, truth, placed = ask(model, drawn, task, settings, int(rng.integers(2**31)))
+        answer, truth, placed = ask(model, drawn, task, settings, int(rng.integers(2**31)))
         known = torch.from_numpy(task.known).to(device)
         return losses(answer, truth, placed, known, drawn.bones)
 
