@@ -238,17 +238,22 @@ def lafan1(
 @bench.command
 def threshold(
     *,
+    network: str = "cae",
     data: Path = Path("data"),
     most: int | None = 60,
     plot: Path | None = None,
     save: bool = False,
     json: bool = False,
 ) -> None:
-    """From which length of gap on the network beats the spline: what the method auto goes by.
+    """From which length of gap on a network beats the spline: what the method auto goes by.
 
     Measured on validation performers.
 
+    Try:
+      interpose bench threshold --data data --save
+
     Args:
+        network: the method: cae, small, ...
         data: the folder with the unpacked data sets.
         most: windows of each data set.
         plot: an SVG file to draw the errors into.
@@ -258,9 +263,9 @@ def threshold(
     from interpose.evaluation.threshold import measure
     from interpose.methods import weights
 
-    card = weights.find("cae")
+    card = weights.find(network)
     with _bar() as progress:
-        result = measure(data, most, progress)
+        result = measure(data, network, most, progress)
     if plot is not None:
         result.plot(plot)
     if save:
@@ -296,6 +301,35 @@ def context(
         result = run(asked.data, asked.split, most, progress)
     if plot is not None:
         result.plot(plot)
+    _show(result, asked)
+
+
+@bench.command
+def every(
+    *,
+    methods: list[str] = [],  # noqa: B006
+    most: int | None = 8,
+    asked: Tabled = Tabled(),
+) -> None:
+    """Every task by every method: gaps, keys, lost joints, forecasts. Is one network good at all of them?
+
+    Finished motion on the performers' own skeletons, mean error in cm of what was hidden.
+
+    Try:
+      interpose bench every --data data
+      interpose bench every --data data --split test --methods spline,cae --most 40
+
+    Args:
+        methods: names separated by commas; all that are installed without it.
+        most: windows of each data set.
+    """
+    from interpose.cli.reading import split_names
+    from interpose.evaluation.every import run
+    from interpose.methods import registry
+
+    with _bar() as progress:
+        chosen = split_names(methods) or registry.names()
+        result = run(asked.data, chosen, asked.split, most, progress)
     _show(result, asked)
 
 

@@ -1,4 +1,4 @@
-"""From which length of gap on the network beats the spline: what the method `auto` goes by."""
+"""From which length of gap on a network beats the spline: what the method `auto` goes by."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from interpose.methods import registry
 from interpose.show.plot import line_plot
 
 GAPS = (2, 4, 6, 8, 10, 12, 15, 20, 25, 30, 40, 50, 60)
-METHODS = ("linear", "spline", "cae")
+PLAIN = ("linear", "spline")
 
 
 @dataclass
@@ -25,7 +25,7 @@ class Threshold:
     """Mean global joint error in cm of finished fills on validation performers, by gap length.
 
     Attributes:
-        errors: method to one error per length in GAPS.
+        errors: method to one error per length in GAPS; the network last.
         from_gap: the shortest length from which on the network is better at every longer one; one more than
             the longest when it never is.
         count: windows.
@@ -51,11 +51,13 @@ class Threshold:
         )
 
     def __str__(self) -> str:
-        rows = [[str(gap), *(f"{self.errors[n][i]:.2f}" for n in METHODS)] for i, gap in enumerate(GAPS)]
+        rows = [
+            [str(gap), *(f"{held[i]:.2f}" for held in self.errors.values())] for i, gap in enumerate(GAPS)
+        ]
         return (
-            f"{markdown(['gap', *METHODS], rows)}\n\n"
+            f"{markdown(['gap', *self.errors], rows)}\n\n"
             f"Mean joint error in cm of finished fills, {self.count} windows of validation performers.\n"
-            f"The network is better from {self.from_gap} frames on."
+            f"{list(self.errors)[-1]} is better than the spline from {self.from_gap} frames on."
         )
 
 
@@ -70,20 +72,24 @@ def crossing(spline: list[float], network: list[float]) -> int:
 
 
 def measure(
-    data: Path, most: int | None = 60, progress: Callable[[float, str], None] = lambda share, line: None
+    data: Path,
+    network: str = "cae",
+    most: int | None = 60,
+    progress: Callable[[float, str], None] = lambda share, line: None,
 ) -> Threshold:
-    """Fill gaps of every length in windows of validation performers by each method."""
+    """Fill gaps of every length in windows of validation performers by the network and by interpolation."""
+    methods = (*PLAIN, network)
     chosen = list(windows(data, DATASETS, "validation", most=most, progress=lambda line: progress(0.0, line)))
-    errors: dict[str, list[list[float]]] = {name: [[] for _ in GAPS] for name in METHODS}
+    errors: dict[str, list[list[float]]] = {name: [[] for _ in GAPS] for name in methods}
     for done, window in enumerate(chosen):
         for i, frames in enumerate(GAPS):
             gap = window.centred(frames)
             hidden = window.hide(gap)
             part = slice(gap.start, gap.stop)
-            for name in METHODS:
+            for name in methods:
                 filled = window.canonical(complete(window.clip, hidden, registry.get(name)).clip)
                 wrong = np.linalg.norm((filled - window.positions)[part, 1:], axis=-1)
                 errors[name][i].append(100 * float(wrong.mean()))
         progress((done + 1) / len(chosen), f"{done + 1} of {len(chosen)} windows")
     means = {name: [float(np.mean(held)) for held in lengths] for name, lengths in errors.items()}
-    return Threshold(means, crossing(means["spline"], means["cae"]), len(chosen))
+    return Threshold(means, crossing(means["spline"], means[network]), len(chosen))
