@@ -82,6 +82,7 @@ def session(path: Path) -> Any:
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
+    options.log_severity_level = 3  # errors: what it could not fold into constants is nothing to users
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 

@@ -321,9 +321,9 @@ class Base(nn.Module):
         config = self.config
         columns, moved, contact, risk = said.to(start.motion.root.dtype).split(SAID, dim=2)
         exactly = known >= 1
-        open_ = torch.where(exactly, 0.0, 1.0)
+        open_ = 1 - exactly.to(known.dtype)
         if config.room and config.residual:
-            open_ = room(known.transpose(1, 2).flatten(0, 1)).unflatten(0, (len(known), -1)).transpose(1, 2)
+            open_ = room(known.transpose(1, 2).flatten(0, 1)).unflatten(0, (known.shape[0], -1)).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
         shares = list(open_[..., :COUNT].unbind(2))
         for joint, parent in enumerate(PARENTS):
