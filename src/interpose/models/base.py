@@ -323,7 +323,8 @@ class Base(nn.Module):
         exactly = known >= 1
         open_ = 1 - exactly.to(known.dtype)
         if config.room and config.residual:
-            open_ = room(known.transpose(1, 2).flatten(0, 1)).unflatten(0, (known.shape[0], -1)).transpose(1, 2)
+            flat = room(known.transpose(1, 2).flatten(0, 1))
+            open_ = flat.unflatten(0, (known.shape[0], -1)).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
         shares = list(open_[..., :COUNT].unbind(2))
         for joint, parent in enumerate(PARENTS):
