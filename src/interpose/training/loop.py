@@ -142,6 +142,7 @@ class Trainer:
         make = optimizer or (lambda some: torch.optim.Adam(some, settings.learning_rate))
         self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
         self.opponent = opponent
+        self.board: Any = None  # TensorBoard's, where it is installed
         self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
         # Every process draws batches of its own.
         self.rng = np.random.default_rng([settings.seed, rank()])
@@ -263,10 +264,11 @@ class Trainer:
             return
         from torch.utils.tensorboard import SummaryWriter
 
-        with SummaryWriter(self.folder) as board:
-            for name, value in entry.items():
-                if name != "step":
-                    board.add_scalar(name, value, int(entry["step"]))
+        self.board = self.board or SummaryWriter(self.folder)
+        for name, value in entry.items():
+            if name != "step":
+                self.board.add_scalar(name, value, int(entry["step"]))
+        self.board.flush()
 
     def _tell(self, loss: float) -> None:
         entry = {
