@@ -55,3 +55,11 @@ def test_listing_methods_loads_no_network():
     )
     said = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert said.stdout.strip() == "[]"
+
+
+def test_weights_by_name_or_by_folder(tmp_path):
+    card = weights.card("cae")
+    assert card.name == "cae"
+    assert weights.card(str(card.path.parent)) == card
+    with pytest.raises(RequestError, match="unknown model"):
+        weights.card(str(tmp_path))

@@ -90,7 +90,7 @@ class Run:
     ] = field(default_factory=list)
     start: Annotated[
         str | None,
-        Parameter(help="go on from these installed weights, by name, instead of from nothing."),
+        Parameter(help="go on from these weights, by name or by folder, instead of from nothing."),
     ] = None
     set: Annotated[
         list[str],

@@ -119,8 +119,10 @@ def load(folder: Path, method: str) -> Card:
 
 
 def card(name: str) -> Card:
-    """The card of some weights by name; the error lists all names."""
+    """The card of some weights by name, or of the only ones in a folder; the error lists all names."""
     for known in cards():
         if known.name == name:
             return known
+    if Path(name).is_dir() and len(found := [*Path(name).glob("*.onnx")]) == 1:
+        return Card.load(found[0].with_suffix(".json"))
     raise unknown("model", name, [known.name for known in cards()])
