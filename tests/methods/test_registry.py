@@ -9,7 +9,7 @@ from importlib.metadata import EntryPoint
 import pytest
 
 from interpose.errors import RequestError
-from interpose.methods import classical, registry
+from interpose.methods import classical, registry, weights
 
 
 @pytest.fixture
