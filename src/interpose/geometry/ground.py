@@ -7,6 +7,8 @@ from typing import Any
 
 from array_api_compat import array_namespace
 
+from interpose.geometry.rotations import parts
+
 Array = Any
 
 
@@ -19,6 +21,6 @@ def wrap(angles: Array) -> Array:
 def turn(vectors: Array, yaw: Array) -> Array:
     """Vectors (..., 3) turned about Y by `yaw` (...) radians; positive from Z towards X."""
     xp = array_namespace(vectors, yaw)
-    x, y, z = xp.unstack(vectors, axis=-1)
+    x, y, z = parts(vectors)
     cosine, sine = xp.cos(yaw), xp.sin(yaw)
     return xp.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=-1)

@@ -28,6 +28,16 @@ def identity(*shape: int, like: Array = None) -> Array:
     return one
 
 
+def parts(values: Array) -> tuple[Array, ...]:
+    """Arrays (..., n) taken apart along the last axis, all at once.
+
+    In torch the gradient of one that is picked alone is an array of zeros with that one in it.
+    """
+    if hasattr(values, "unbind"):  # torch's own takes no detour over the first axis
+        return tuple(values.unbind(-1))
+    return tuple(array_namespace(values).unstack(values, axis=-1))
+
+
 def normalize(q: Array) -> Array:
     """The unit vector along `q` (..., n); zero vectors stay zero."""
     xp = array_namespace(q)
@@ -39,9 +49,8 @@ def normalize(q: Array) -> Array:
 def multiply(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4): the rotation `b` followed by `a`."""
     xp = array_namespace(a, b)
-    # At once: the gradient of a value that is picked alone is an array of zeros with one value in it.
-    aw, ax, ay, az = xp.unstack(a, axis=-1)
-    bw, bx, by, bz = xp.unstack(b, axis=-1)
+    aw, ax, ay, az = parts(a)
+    bw, bx, by, bz = parts(b)
     return xp.stack(
         [
             aw * bw - ax * bx - ay * by - az * bz,
@@ -62,8 +71,8 @@ def conjugate(q: Array) -> Array:
 def cross(a: Array, b: Array) -> Array:
     """Cross product of (..., 3) vectors, broadcasting."""
     xp = array_namespace(a, b)
-    a0, a1, a2 = xp.unstack(a, axis=-1)
-    b0, b1, b2 = xp.unstack(b, axis=-1)
+    a0, a1, a2 = parts(a)
+    b0, b1, b2 = parts(b)
     return xp.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
@@ -129,7 +138,7 @@ def slerp(a: Array, b: Array, t: Array) -> Array:
 def to_matrix(q: Array) -> Array:
     """Unit quaternion (..., 4) to rotation matrix (..., 3, 3), for column vectors."""
     xp = array_namespace(q)
-    w, x, y, z = xp.unstack(q, axis=-1)
+    w, x, y, z = parts(q)
     rows = [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
@@ -144,7 +153,7 @@ def from_matrix(m: Array) -> Array:
     Of the four ways to write the quaternion the best conditioned one is taken (Shepperd 1978).
     """
     xp = array_namespace(m)
-    m00, m01, m02, m10, m11, m12, m20, m21, m22 = xp.unstack(xp.reshape(m, (*m.shape[:-2], 9)), axis=-1)
+    m00, m01, m02, m10, m11, m12, m20, m21, m22 = parts(xp.reshape(m, (*m.shape[:-2], 9)))
     a, b, c = m21 - m12, m02 - m20, m10 - m01
     d, e, f = m10 + m01, m02 + m20, m21 + m12
     diagonal = [1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22]
