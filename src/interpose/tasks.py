@@ -395,9 +395,7 @@ def forecast(
     job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
     chosen = job.method.name if method == "auto" and job.method else method
     if samples > 1 and not isinstance(registry.get(chosen), Sampler):
-        raise RequestError(
-            f"cannot draw {samples} samples with {chosen}", "it has one answer only", "Use --method stmi-gan."
-        )
+        raise registry.one_answer(f"cannot draw {samples} samples with {chosen}")
     seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]
 
     def part(i: int) -> Callable[[float], None] | None:

@@ -45,7 +45,7 @@ def denoise(
         strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
         frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0. All without it.
-        method: what fills lost values: auto (interpolates), stmi-gan, ...; `interpose models` lists them.
+        method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
         seed: for methods that sample.
         output: where to write the clip; the report goes beside it.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.

@@ -51,11 +51,11 @@ def forecast(
     Args:
         file: the clip (.bvh, .npz, .amc).
         frames: how many to add, at the clip's own rate; 2 seconds without it.
-        samples: in how many ways it may go on; each is written to a file of its own.
+        samples: in how many ways it may go on, each in a file of its own; for methods that draw at random.
         seed: of what is drawn at random. One sample without it is the most likely one.
         temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
         output: where to write the clip; the report goes beside it.
-        method: how it is continued: auto (the default), stmi-gan, linear, ...; `interpose models` lists them.
+        method: how it is continued: auto (the default), cae, linear, ...; `interpose models` lists them.
         player: write a page (take.forecast.html) that plays all samples; it opens in any browser.
         json: print the report as JSON.
         force: replace existing files, of .json files only reports.

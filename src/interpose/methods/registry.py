@@ -84,7 +84,17 @@ def warmed(method: Method, temperature: float) -> Method:
     if temperature == 1.0:
         return method
     if not isinstance(method, Sampler):
-        raise RequestError(
-            f"{method.name} has no temperature", "it has one answer only", "Use --method stmi-gan."
-        )
+        raise one_answer(f"{method.name} has no temperature")
     return method.at(temperature)
+
+
+def one_answer(what: str) -> RequestError:
+    """That a method has one answer only, and which ones have more."""
+    others = [name for name in names() if isinstance(get(name), Sampler)]
+    return RequestError(
+        what,
+        "it has one answer only",
+        f"Use --method {' or '.join(others)}."
+        if others
+        else "No method that is installed draws samples yet.",
+    )
