@@ -395,7 +395,7 @@ def _training(
 ) -> dict[str, Any]:
     """How the weights came to be, for the card."""
     return {
-        "recipe": f"interpose train {name}" + (f" --start {name}" if earlier else ""),
+        "recipe": f"interpose train {name}" + (", going on from what `earlier` tells of" if earlier else ""),
         **settings,
         "splits": splits,
         "steps": log[-1]["step"],
