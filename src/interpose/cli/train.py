@@ -108,7 +108,8 @@ def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipp
     recipe(load_packs(run.packs), run.out, budget, changed, splits=chosen, start=begin, say=say)
     say(f"done: {run.out}")
     # So does a study.
-    there = Path("weights") / name if shipped and not run.set else run.out / "weights"
+    own = changed.config if name == "base" else name
+    there = Path("weights") / own if shipped and not run.set else run.out / "weights"
     say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}")
 
 
