@@ -17,6 +17,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "kalman": ("interpose.methods.kalman", "Kalman"),
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
+    "small": ("interpose.methods.base", "small"),
 }
 
 # The entry-point group in which other packages offer methods: name = "package.module:Class".
