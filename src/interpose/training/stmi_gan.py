@@ -216,7 +216,7 @@ class Game:
         pairs = (whole[..., a] & whole[..., b])[..., LIMB_PAIRS]
         per = PAPER.frames / frames
         return (
-            asked.reconstruction * per * (wrong.square().sum(dim=3) + 1e-8).sqrt().sum(dim=(1, 2)).mean()
+            asked.reconstruction * per * (wrong.square().sum(dim=3) + 1e-12).sqrt().sum(dim=(1, 2)).mean()
             + asked.limbs * per * (off[..., LIMB_PAIRS] * pairs).sum(dim=(1, 2)).mean()
             + asked.bones * per * off[..., BONE_PAIRS].sum(dim=(1, 2)).mean()
         )
