@@ -317,12 +317,9 @@ def train_base(
         clip=1.0,
         about={"network": asdict(model.config)},
     )
-    if start:
-        trainer.follow(start)
-    say(f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}")
-    if trainer.resume():
-        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
-    return trainer.run()
+    return trainer.go(
+        f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}", start
+    )
 
 
 @torch.no_grad()

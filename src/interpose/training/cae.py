@@ -232,12 +232,9 @@ def train_cae(
     trainer = Trainer(
         model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say
     )
-    if start:
-        trainer.follow(start)
-    say(f"{settings.network}, {windows.frames:,} frames of {', '.join(splits)}, on {device}")
-    if trainer.resume():
-        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
-    return trainer.run()
+    return trainer.go(
+        f"{settings.network}, {windows.frames:,} frames of {', '.join(splits)}, on {device}", start
+    )
 
 
 @torch.no_grad()

@@ -178,6 +178,20 @@ class Trainer:
             log = start.path.with_name("log.jsonl")
             (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
 
+    def go(self, what: str, start: Card | None = None) -> Any:
+        """Say what is trained, and train it or go on with it; the averaged model comes back.
+
+        Args:
+            what: in words.
+            start: the weights that the model was filled with, if any.
+        """
+        if start:
+            self.follow(start)
+        self.say(what)
+        if self.resume():
+            self.say(f"goes on at {100 * self.budget.fraction:.0f} % of the budget")
+        return self.run()
+
     def save(self) -> None:
         state = {
             "model": self.model.state_dict(),

@@ -84,12 +84,9 @@ def train_seq2seq(
         clip=5.0,
         about={"config": asdict(model.config)},
     )
-    if start:
-        trainer.follow(start)
-    say(f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}")
-    if trainer.resume():
-        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
-    return trainer.run()
+    return trainer.go(
+        f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start
+    )
 
 
 @torch.no_grad()

@@ -290,12 +290,9 @@ def train_stmi_gan(
         about={"network": asdict(settings.network)},
         opponent=opponent if settings.looks else None,
     )
-    if start:
-        trainer.follow(start)
-    say(f"{settings.config}, {windows.frames:,} frames of {', '.join(splits)}, on {device}")
-    if trainer.resume():
-        say(f"goes on at {100 * budget.fraction:.0f} % of the budget")
-    return trainer.run()
+    return trainer.go(
+        f"{settings.config}, {windows.frames:,} frames of {', '.join(splits)}, on {device}", start
+    )
 
 
 @torch.no_grad()
