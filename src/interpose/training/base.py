@@ -69,6 +69,8 @@ class BaseSettings(Settings):
     labelled: float = 0.5  # share of the motions that are told their label
     noise: float = 0.06  # metres, and radians, of the worst noise
     mirror: int = 1  # whether half of the motions are mirrored
+    # Whether a step is compiled: half as fast again, after minutes at the beginning; needs a C++ compiler.
+    compiled: int = 0
     # The network's own settings.
     dropout: float = 0.0
     residual: int = 1
@@ -191,30 +193,17 @@ def draw_batch(
     return drawn, task
 
 
-def ask(
-    model: Base, drawn: Batch, task: Task, settings: BaseSettings, seed: int
-) -> tuple[Answer, Motion, Tensor]:
-    """What the network answers, the truth, and where its joints are (B, T, 22, 3)."""
-    device = drawn.root.device
-    truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
-    placed = drawn.positions()
-    known, pins, noisy = (torch.from_numpy(some).to(device) for some in (task.known, task.pins, task.noisy))
-    local, root = truth.local, truth.root
-    if task.noisy.any():
-        generator = torch.Generator(device).manual_seed(seed)
-        worst = (
-            settings.noise
-            * torch.rand(len(root), 1, 1, device=device, generator=generator)
-            * noisy[:, None, None]
-        )
-        root = root + worst * torch.randn(root.shape, device=device, generator=generator)
-        turns = torch.randn((*local.shape[:-1], 3), device=device, generator=generator)
-        local = rotations.multiply(local, rotations.exp(worst[..., None] * turns))
-    start = model.start(local, root, known, drawn.bones)
-    seen = model.features(start, known, placed, pins)
-    with torch.autocast(device.type, torch.bfloat16):
-        said = model.encoder(seen, drawn.label, drawn.bones)
-    return model.answer(start, said, local, known), truth, placed
+def spoil(motion: Motion, noisy: Tensor, worst: float, seed: int) -> Motion:
+    """Motions with noise of up to `worst` metres, and radians, in those that are `noisy` (B,)."""
+    local, root = motion.local, motion.root
+    if not noisy.any():
+        return motion
+    generator = torch.Generator(root.device).manual_seed(seed)
+    drawn = torch.rand(len(root), 1, 1, device=root.device, generator=generator)
+    size = worst * drawn * noisy[:, None, None]
+    moved = root + size * torch.randn(root.shape, device=root.device, generator=generator)
+    turns = torch.randn((*local.shape[:-1], 3), device=root.device, generator=generator)
+    return Motion(rotations.multiply(local, rotations.exp(size[..., None] * turns)), moved)
 
 
 class Losses:
@@ -294,11 +283,30 @@ def train_base(
         restore(model, start.onnx)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
 
+    def wrong(
+        given: Motion,
+        truth: Motion,
+        placed: Tensor,
+        known: Tensor,
+        pins: Tensor,
+        label: Tensor,
+        bones: Tensor,
+    ) -> Tensor:
+        start = model.start(given.local, given.root, known, bones)
+        seen = model.features(start, known, placed, pins)
+        with torch.autocast(device.type, torch.bfloat16):
+            said = model.encoder(seen, label, bones)
+        return losses(model.answer(start, said, given.local, known), truth, placed, known, bones)
+
+    asked = torch.compile(wrong, dynamic=True) if settings.compiled else wrong
+
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         drawn, task = draw_batch(rng, poses, settings, batch)
-        answer, truth, placed = ask(model, drawn, task, settings, int(rng.integers(2**31)))
-        known = torch.from_numpy(task.known).to(device)
-        return losses(answer, truth, placed, known, drawn.bones)
+        known, pins, noisy = (torch.from_numpy(x).to(device) for x in (task.known, task.pins, task.noisy))
+        truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
+        given = spoil(truth, noisy, settings.noise, int(rng.integers(2**31)))
+        told: Tensor = asked(given, truth, drawn.positions(), known, pins, drawn.label, drawn.bones)
+        return told
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
         return torch.optim.AdamW(
