@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -9,27 +10,58 @@ import numpy as np
 from array_api_compat import array_namespace
 
 from interpose.geometry import rotations
+from interpose.geometry.bilinear import constant
 
 Array = Any
 
 
+@dataclass(frozen=True)
+class _Plan:
+    """How joints hang together.
+
+    Attributes:
+        levels: joints by depth, in one array each.
+        above: for each level but the first the places of its parents in the level before.
+        order: where each joint is when all levels stand one after the other.
+        parents: of each joint; of roots, joint 0.
+        roots, others: (J, 1) 1 for joints without, and with, a parent, else 0.
+        ancestors: (J, J) 1 where the column is the row's joint or stands above it, else 0.
+    """
+
+    levels: tuple[np.ndarray, ...]
+    above: tuple[np.ndarray, ...]
+    order: np.ndarray
+    parents: np.ndarray
+    roots: np.ndarray
+    others: np.ndarray
+    ancestors: np.ndarray
+
+
 @lru_cache(maxsize=64)
-def _plan(parents: tuple[int, ...]) -> tuple[tuple[tuple[int, ...], ...], np.ndarray]:
-    """Joints by depth, and the matrix (J, J) that is 1 where the column is the row or an ancestor of it."""
+def _plan(parents: tuple[int, ...]) -> _Plan:
     depth = [0] * len(parents)
     ancestors = np.eye(len(parents))
     for joint, parent in enumerate(parents):
         if parent >= 0:
             depth[joint] = depth[parent] + 1
             ancestors[joint] += ancestors[parent]
-    levels = tuple(tuple(j for j, d in enumerate(depth) if d == level) for level in range(max(depth) + 1))
-    return levels, ancestors
+    levels = [[j for j, d in enumerate(depth) if d == level] for level in range(max(depth) + 1)]
+    above = [[before.index(parents[j]) for j in level] for before, level in zip(levels, levels[1:])]
+    roots = (np.array(parents)[:, None] < 0).astype(float)
+    return _Plan(
+        levels=tuple(map(np.array, levels)),
+        above=tuple(map(np.array, above)),
+        order=np.argsort([j for level in levels for j in level]),
+        parents=np.maximum(parents, 0),
+        roots=roots,
+        others=1 - roots,
+        ancestors=ancestors,
+    )
 
 
-def _constant(xp: Any, values: Any, like: Array, dtype: Any = None) -> Array:
-    """`values` as an array beside `like` (same library, same device)."""
-    device = like.device if not isinstance(like, np.ndarray) else None
-    return xp.asarray(values, dtype=dtype, device=device)
+def ancestors(parents: tuple[int, ...]) -> np.ndarray:
+    """A matrix (J, J): 1 where the column is the row's joint or stands above it, else 0."""
+    return _plan(parents).ancestors
 
 
 def global_rotations(local: Array, parents: tuple[int, ...]) -> Array:
@@ -37,24 +69,19 @@ def global_rotations(local: Array, parents: tuple[int, ...]) -> Array:
 
     All joints of the same depth are multiplied at once.
     """
-    xp = array_namespace(local)
-    levels, _ = _plan(parents)
-    done = [local[..., list(levels[0]), :]]
-    place = {joint: i for i, joint in enumerate(levels[0])}
-    for before, level in zip(levels, levels[1:]):
-        above = done[-1][..., [before.index(parents[j]) for j in level], :]
-        done.append(rotations.multiply(above, local[..., list(level), :]))
-    order = [j for level in levels for j in level]
-    place = {joint: i for i, joint in enumerate(order)}
-    return xp.concat(done, axis=-2)[..., [place[j] for j in range(len(parents))], :]
+    xp, plan = array_namespace(local), _plan(parents)
+    done = [_take(local, plan.levels[0])]
+    for level, above in zip(plan.levels[1:], plan.above):
+        done.append(rotations.multiply(_take(done[-1], above), _take(local, level)))
+    return _take(xp.concat(done, axis=-2), plan.order)
 
 
 def local_rotations(globals_: Array, parents: tuple[int, ...]) -> Array:
     """Global quaternions (..., J, 4) back to local ones: the inverse of `global_rotations`."""
-    xp = array_namespace(globals_)
-    above = globals_[..., [max(p, 0) for p in parents], :]
-    roots = _constant(xp, [p < 0 for p in parents], globals_)[..., None]
-    return xp.where(roots, globals_, rotations.multiply(rotations.conjugate(above), globals_))
+    plan = _plan(parents)
+    turned = rotations.multiply(rotations.conjugate(_take(globals_, plan.parents)), globals_)
+    # Sums with masks: in graphs a choice is slow.
+    return constant(plan.roots, globals_) * globals_ + constant(plan.others, globals_) * turned
 
 
 def forward(local: Array, translation: Array, parents: tuple[int, ...]) -> tuple[Array, Array]:
@@ -69,11 +96,14 @@ def forward(local: Array, translation: Array, parents: tuple[int, ...]) -> tuple
         Global quaternions (..., J, 4) and global positions (..., J, 3). Positions are one product of
         the ancestor matrix with all bone vectors instead of a chain of small ones.
     """
-    xp = array_namespace(local)
-    _, ancestors = _plan(parents)
+    xp, plan = array_namespace(local), _plan(parents)
     turned = global_rotations(local, parents)
-    above = turned[..., [max(p, 0) for p in parents], :]
-    roots = _constant(xp, [p < 0 for p in parents], local)[..., None]
     translation = xp.broadcast_to(translation, (*local.shape[:-1], 3))
-    bones = xp.where(roots, translation, rotations.rotate(above, translation))
-    return turned, xp.matmul(_constant(xp, ancestors, local, local.dtype), bones)
+    bones = rotations.rotate(_take(turned, plan.parents), translation)
+    bones = constant(plan.roots, local) * translation + constant(plan.others, local) * bones
+    return turned, xp.matmul(constant(plan.ancestors, local), bones)
+
+
+def _take(values: Array, joints: np.ndarray) -> Array:
+    """Some joints of (..., J, n)."""
+    return array_namespace(values).take(values, constant(joints, values), axis=-2)

@@ -10,10 +10,35 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 from array_api_compat import array_namespace
+
+from interpose.geometry.bilinear import bilinear, constant, table
 
 Array = Any
 AXES = "XYZ"
+
+PRODUCT = table("wxyz", "wxyz", "ww-xx-yy-zz", "wx+xw+yz-zy", "wy-xz+yw+zx", "wz+xy-yx+zw")
+CROSS = table("xyz", "xyz", "yz-zy", "zx-xz", "xy-yx")
+_MATRIX = [
+    ["ww+xx-yy-zz", "xy+xy-wz-wz", "xz+xz+wy+wy"],
+    ["xy+xy+wz+wz", "ww-xx+yy-zz", "yz+yz-wx-wx"],
+    ["xz+xz-wy-wy", "yz+yz+wx+wx", "ww-xx-yy+zz"],
+]
+MATRIX = table("wxyz", "wxyz", *_MATRIX[0], *_MATRIX[1], *_MATRIX[2])
+COLUMNS = table("wxyz", "wxyz", *(_MATRIX[row][column] for column in (0, 1) for row in range(3)))
+# A matrix with the rows abc, def, ghi: its product with a vector; four times each component of its quaternion
+# squared; and four times its quaternion times the component that is asked for ("o" is the number one).
+APPLY = table("abcdefghi", "xyz", "ax+by+cz", "dx+ey+fz", "gx+hy+iz")
+SQUARES = table("oaei", "o", "oo+ao+eo+io", "oo+ao-eo-io", "oo-ao+eo-io", "oo-ao-eo+io")
+TIMES = table(
+    "wxyz",
+    "oabcdefghi",
+    "wo+wa+we+wi+xh-xf+yc-yg+zd-zb",
+    "wh-wf+xo+xa-xe-xi+yb+yd+zc+zg",
+    "wc-wg+xb+xd+yo-ya+ye-yi+zf+zh",
+    "wd-wb+xc+xg+yf+yh+zo-za-ze+zi",
+)
 
 
 def identity(*shape: int, like: Array = None) -> Array:
@@ -28,38 +53,16 @@ def identity(*shape: int, like: Array = None) -> Array:
     return one
 
 
-def parts(values: Array) -> tuple[Array, ...]:
-    """Arrays (..., n) taken apart along the last axis, all at once.
-
-    In torch the gradient of one that is picked alone is an array of zeros with that one in it.
-    """
-    if hasattr(values, "unbind"):  # torch's own takes no detour over the first axis
-        return tuple(values.unbind(-1))
-    return tuple(array_namespace(values).unstack(values, axis=-1))
-
-
 def normalize(q: Array) -> Array:
     """The unit vector along `q` (..., n); zero vectors stay zero."""
     xp = array_namespace(q)
     square = xp.sum(q * q, axis=-1, keepdims=True)
-    safe = xp.where(square > 0, square, xp.ones_like(square))
-    return q / xp.sqrt(safe)
+    return q / xp.sqrt(xp.where(square > 0, square, 1.0))
 
 
 def multiply(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4): the rotation `b` followed by `a`."""
-    xp = array_namespace(a, b)
-    aw, ax, ay, az = parts(a)
-    bw, bx, by, bz = parts(b)
-    return xp.stack(
-        [
-            aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
-        ],
-        axis=-1,
-    )
+    return bilinear(a, b, PRODUCT)
 
 
 def conjugate(q: Array) -> Array:
@@ -70,16 +73,12 @@ def conjugate(q: Array) -> Array:
 
 def cross(a: Array, b: Array) -> Array:
     """Cross product of (..., 3) vectors, broadcasting."""
-    xp = array_namespace(a, b)
-    a0, a1, a2 = parts(a)
-    b0, b1, b2 = parts(b)
-    return xp.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+    return bilinear(a, b, CROSS)
 
 
 def rotate(q: Array, v: Array) -> Array:
     """The vectors `v` (..., 3) turned by `q` (..., 4)."""
-    t = 2.0 * cross(q[..., 1:], v)
-    return v + q[..., :1] * t + cross(q[..., 1:], t)
+    return bilinear(bilinear(q, q, MATRIX), v, APPLY)
 
 
 def exp(rotvec: Array) -> Array:
@@ -137,14 +136,7 @@ def slerp(a: Array, b: Array, t: Array) -> Array:
 
 def to_matrix(q: Array) -> Array:
     """Unit quaternion (..., 4) to rotation matrix (..., 3, 3), for column vectors."""
-    xp = array_namespace(q)
-    w, x, y, z = parts(q)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return xp.stack([xp.stack(row, axis=-1) for row in rows], axis=-2)
+    return array_namespace(q).reshape(bilinear(q, q, MATRIX), (*q.shape[:-1], 3, 3))
 
 
 def from_matrix(m: Array) -> Array:
@@ -153,17 +145,12 @@ def from_matrix(m: Array) -> Array:
     Of the four ways to write the quaternion the best conditioned one is taken (Shepperd 1978).
     """
     xp = array_namespace(m)
-    m00, m01, m02, m10, m11, m12, m20, m21, m22 = parts(xp.reshape(m, (*m.shape[:-2], 9)))
-    a, b, c = m21 - m12, m02 - m20, m10 - m01
-    d, e, f = m10 + m01, m02 + m20, m21 + m12
-    diagonal = [1 + m00 + m11 + m22, 1 + m00 - m11 - m22, 1 - m00 + m11 - m22, 1 - m00 - m11 + m22]
-    best = xp.argmax(xp.stack(diagonal, axis=-1), axis=-1)[..., None]
-    w, x, y, z = diagonal
-    q = xp.stack([w, a, b, c], axis=-1)
-    for i, candidate in enumerate(([a, x, d, e], [b, d, y, f], [c, e, f, z]), 1):
-        q = xp.where(best == i, xp.stack(candidate, axis=-1), q)
-    q = normalize(q)
-    return xp.where(q[..., :1] < 0, -q, q)
+    rows = xp.reshape(m, (*m.shape[:-2], 9))
+    one = xp.ones_like(rows[..., :1])
+    squares = bilinear(xp.concat([one, rows[..., ::4]], axis=-1), one, SQUARES)
+    best = xp.argmax(squares, axis=-1)[..., None] == constant(np.arange(4), m)
+    q = normalize(bilinear(xp.astype(best, m.dtype), xp.concat([one, rows], axis=-1), TIMES))
+    return q * xp.where(q[..., :1] < 0, -one, one)
 
 
 def to_6d(q: Array) -> Array:
@@ -171,9 +158,7 @@ def to_6d(q: Array) -> Array:
 
     Source: Zhou et al., On the Continuity of Rotation Representations in Neural Networks, 2019.
     """
-    xp = array_namespace(q)
-    m = to_matrix(q)
-    return xp.concat([m[..., :, 0], m[..., :, 1]], axis=-1)
+    return bilinear(q, q, COLUMNS)
 
 
 def from_6d(v: Array) -> Array:

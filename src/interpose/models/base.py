@@ -93,9 +93,8 @@ class Motion:
 
     def forward(self, bones: Tensor) -> tuple[Tensor, Tensor]:
         """Global rotations (B, T, 22, 4) and positions (B, T, 22, 3) with bones (B, 22, 3)."""
-        move = bones[:, None].expand(*self.local.shape[:-1], 3)
-        hips = torch.arange(COUNT, device=move.device)[:, None] == 0
-        return kinematics.forward(self.local, torch.where(hips, self.root[:, :, None], move), PARENTS)
+        move = bones[:, None, 1:].expand(-1, self.root.shape[1], -1, -1)
+        return kinematics.forward(self.local, torch.cat([self.root[:, :, None], move], dim=2), PARENTS)
 
 
 def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Tensor:
@@ -109,24 +108,24 @@ def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Ten
     frame = torch.arange(values.shape[1], device=values.device)
     since, until = ((d.clamp(min=0)).to(values.dtype)[..., None] for d in (frame - last, first - frame))
     length = (first - last).to(values.dtype)[..., None]
-    between = length > 0
-    share = torch.where(between, since / length.clamp(min=1.0), (until > 0).to(values.dtype))
-    a, b = pick(values, last), pick(values, first)
+    share = torch.where(length > 0, since / length.clamp(min=1.0), (until > 0).to(values.dtype))
+    held = known.to(values.dtype)[..., None]
+    both = held[:, 1:] * held[:, :-1]
+    steps = torch.cat([both * (values[:, 1:] - values[:, :-1]), both], dim=2)
+    # Values, the step to or from the frame beside, and whether that is known, too.
+    parts = [values.shape[2]] * 2 + [1]
+    pad = nn.functional.pad
+    a, before, has_before = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=2), last).split(parts, 2)
+    b, after, has_after = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=2), first).split(parts, 2)
     line = a + share * (b - a)
     if reach is None:
         return line
-    slope = torch.where(between, (b - a) / length.clamp(min=1.0), torch.zeros_like(a))
-    step = values[:, 1:] - values[:, :-1]
-    both = known[:, 1:] & known[:, :-1]
-    step = torch.where(both[..., None], step, 0.0)
-    before, after = nn.functional.pad(step, (0, 0, 1, 0)), nn.functional.pad(step, (0, 0, 0, 1))
-    has_before, has_after = nn.functional.pad(both, (1, 0)), nn.functional.pad(both, (0, 1))
-    leave = torch.where(pick(has_before, last)[..., None], pick(before, last) - slope, 0.0)
-    meet = torch.where(pick(has_after, first)[..., None], pick(after, first) - slope, 0.0)
+    slope = (b - a) / length.clamp(min=1.0)
+    leave, meet = has_before * (before - slope), has_after * (after - slope)
     return (
         line
-        + leave * since * (1 - share) ** 2 * torch.exp(-since / reach)
-        - meet * until * share**2 * torch.exp(-until / reach)
+        + leave * (since * (1 - share) * (1 - share) * torch.exp(-since / reach))
+        - meet * (until * share * share * torch.exp(-until / reach))
     )
 
 
@@ -146,6 +145,12 @@ def room(known: Tensor) -> Tensor:
     return torch.where(held & (known < 1), 0.5, share)
 
 
+def mixed(chosen: Tensor, a: Tensor, b: Tensor) -> Tensor:
+    """`a` (..., n) where `chosen` (...), else `b`, by sums: in graphs a choice is slow."""
+    share = chosen.to(a.dtype)[..., None]
+    return share * a + (1 - share) * b
+
+
 class Block(nn.Module):
     """Attention and two layers, normalised before each (Xiong et al. 2020)."""
 
@@ -163,7 +168,7 @@ class Block(nn.Module):
         """x: (B, T, width); bias: (heads, T, T), added to how much frames attend to each other."""
         asked = self.ask(self.norms[0](x)).unflatten(2, (3, self.heads, -1))
         query, key, value = asked.permute(2, 0, 3, 1, 4).unbind(0)
-        score = query @ key.transpose(2, 3) / math.sqrt(query.shape[-1])
+        score = (query / math.sqrt(query.shape[-1])) @ key.transpose(2, 3)
         weight = torch.softmax(score if bias is None else score + bias.to(score.dtype), dim=-1)
         told = (weight @ value).transpose(1, 2).flatten(2)
         x = x + self.dropout(self.say(told))
@@ -245,7 +250,7 @@ class Base(nn.Module):
         batch, count = local.shape[:2]
         held = known > 0
         columns = torch.cat([rotations.to_6d(local), nn.functional.pad(root, (0, 3))[:, :, None]], dim=2)
-        columns = torch.where(held[..., None], columns, 0.0)
+        columns = held.to(columns.dtype)[..., None] * columns
         flat = columns.transpose(1, 2).flatten(0, 1)
         reach = flat.new_tensor([REACH_TURN] * COUNT + [REACH_WAY]).repeat(batch)[:, None, None]
         done = complete_columns(
@@ -256,7 +261,7 @@ class Base(nn.Module):
         never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
         rest = done.new_tensor([1.0, 0, 0, 0, 1.0, 0])
         turned = rotations.from_6d(torch.where(never, rest, done[:, :, :COUNT]))
-        turned = torch.where(held[:, :, :COUNT, None], local, turned)
+        turned = mixed(held[:, :, :COUNT], local, turned)
         motion = Motion(turned, done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
         seen = held[..., 0] & held[..., COUNT]
@@ -279,8 +284,8 @@ class Base(nn.Module):
         hips, around = placed[:, :, 0], placed[:, :, 1:] - placed[:, :, :1]
         around = nn.functional.pad(around, (0, 0, 1, 0))  # the hips themselves, at 0
         steps = [nn.functional.pad(some.diff(dim=1), (0, 0, 1, 0)) for some in (hips, around.flatten(2))]
-        there = pins & torch.isfinite(pinned).all(dim=-1)
-        off = torch.where(there[..., None], turn(pinned - start.placed, yaw), 0.0)
+        there = pins.to(hips.dtype)
+        off = there[..., None] * turn(pinned - start.placed, yaw)
         last, first = neighbours((known > 0).all(dim=2))
         frame = torch.arange(known.shape[1], device=known.device)
         far = torch.stack([frame - last, first - frame], dim=-1).clamp(min=0).to(hips.dtype)
@@ -288,7 +293,7 @@ class Base(nn.Module):
         if not self.config.distances:
             near = torch.zeros_like(near)
         parts = [turned.flatten(2), hips, around.flatten(2), *(VELOCITY * step for step in steps)]
-        parts += [known.to(hips.dtype), off.flatten(2), there.to(hips.dtype), near]
+        parts += [known.to(hips.dtype), off.flatten(2), there, near]
         return torch.cat(parts, dim=2)
 
     def complete(
@@ -327,11 +332,8 @@ class Base(nn.Module):
             flat = room(known.transpose(1, 2).flatten(0, 1))
             open_ = flat.unflatten(0, (known.shape[0], -1)).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
-        shares = list(open_[..., :COUNT].unbind(2))
-        for joint, parent in enumerate(PARENTS):
-            if parent >= 0:
-                shares[joint] = torch.maximum(shares[joint], shares[parent])
-        share = torch.stack(shares, dim=2)[..., None]
+        above = open_.new_tensor(kinematics.ancestors(PARENTS))
+        share = (above * open_[..., None, :COUNT]).amax(dim=-1)[..., None]
         ahead = rotations.about("Y", -start.yaw)[:, None, None]
         begin = rotations.to_6d(rotations.multiply(ahead, start.turned))
         columns = columns.unflatten(2, (COUNT, 6))
@@ -340,7 +342,7 @@ class Base(nn.Module):
         turned = rotations.from_6d(begin + share * columns)
         turned = rotations.multiply(rotations.conjugate(ahead), turned)
         turned = kinematics.local_rotations(turned, PARENTS)
-        turned = torch.where(exactly[..., :COUNT, None], local, turned)
+        turned = mixed(exactly[..., :COUNT], local, turned)
         way = turn(moved, start.yaw[:, None])
         if not config.residual:
             way = way + start.origin[:, None] - start.motion.root

@@ -69,8 +69,6 @@ class BaseSettings(Settings):
     labelled: float = 0.5  # share of the motions that are told their label
     noise: float = 0.06  # metres, and radians, of the worst noise
     mirror: int = 1  # whether half of the motions are mirrored
-    # Whether a step is compiled: half as fast again, after minutes at the beginning; needs a C++ compiler.
-    compiled: int = 0
     # The network's own settings.
     dropout: float = 0.0
     residual: int = 1
@@ -298,15 +296,12 @@ def train_base(
             said = model.encoder(seen, label, bones)
         return losses(model.answer(start, said, given.local, known), truth, placed, known, bones)
 
-    asked = torch.compile(wrong, dynamic=True) if settings.compiled else wrong
-
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         drawn, task = draw_batch(rng, poses, settings, batch)
         known, pins, noisy = (torch.from_numpy(x).to(device) for x in (task.known, task.pins, task.noisy))
         truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
         given = spoil(truth, noisy, settings.noise, int(rng.integers(2**31)))
-        told: Tensor = asked(given, truth, drawn.positions(), known, pins, drawn.label, drawn.bones)
-        return told
+        return wrong(given, truth, drawn.positions(), known, pins, drawn.label, drawn.bones)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
         return torch.optim.AdamW(
