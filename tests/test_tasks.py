@@ -18,7 +18,7 @@ from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights
-from interpose.observation import Gap, Observation, Pin, timeline
+from interpose.observation import Gap, Observation, timeline
 
 METHODS = (*registry.names(), "auto")
 
@@ -130,15 +130,6 @@ def test_auto_says_why_the_network_does_not_fill_a_long_gap(cmu_walk):
     report = tasks.fill(cmu_walk, [Gap(40, 165)], "auto").report.gaps[0]
     assert report.method == "spline"
     assert "125 frames" in " ".join(report.notes)
-
-
-def test_pins_are_refused_rather_than_ignored(cmu_walk):
-    seen = Observation.from_gaps(cmu_walk, [Gap(60, 90)])
-    pinned = replace(seen, pins=(Pin("LeftHand", np.array([70]), np.zeros((1, 3))),))
-    with pytest.raises(RequestError, match="pins"):
-        complete(cmu_walk, pinned, registry.get("spline"))
-    with pytest.raises(RequestError, match="pins"):
-        tasks.fill(cmu_walk, pinned)
 
 
 def test_raw_is_what_the_network_said(cmu_walk):

@@ -99,6 +99,7 @@ def fill(
     progress: Callable[[float], None] | None = None,
     parts: Part | Sequence[Part] = (),
     path: Mapping[int, Any] | None = None,
+    pins: Pin | Sequence[Pin] = (),
 ) -> Completion:
     """Fill gaps of a clip; what is observed comes back unchanged, bit for bit.
 
@@ -114,6 +115,8 @@ def fill(
         progress: called with the share done, 0 to 1.
         parts: poses of single joints that other clips give inside of the gaps.
         path: floor points (x and z in metres) that the root is led over, by frame: {130: (1.2, 0.4)}.
+        pins: where joints are to be at frames inside of gaps: Pin("LeftHand", [130], [[0.3, 1.4, 0.2]]) in
+            metres, Y up. What is out of reach is met as nearly as it can be, and reported.
 
     Returns:
         The completion: `.clip`, `.report` (one entry a gap; `.report.open` lists what was left), `.raw` and
@@ -125,7 +128,7 @@ def fill(
     """
     from interpose import tasks
     from interpose.errors import RequestError
-    from interpose.observation import Observation, Part
+    from interpose.observation import Observation, Part, Pin
     from interpose.observation.scan import scan, to_gaps
 
     clip = _clip(clip)
@@ -141,7 +144,16 @@ def fill(
         wanted = gaps if isinstance(gaps, Observation) else [_gap(gap) for gap in _several(gaps)]
     given = [parts] if isinstance(parts, Part) else list(parts)
     return tasks.fill(
-        clip, wanted, method, max_gap=max_gap, only=only, seed=seed, progress=progress, parts=given, path=path
+        clip,
+        wanted,
+        method,
+        max_gap=max_gap,
+        only=only,
+        seed=seed,
+        progress=progress,
+        parts=given,
+        path=path,
+        pins=[pins] if isinstance(pins, Pin) else list(pins),
     )
 
 

@@ -15,8 +15,9 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, seams
+from interpose.finish import pins as pinning
 from interpose.finish.denoise import denoised
-from interpose.finish.guarantees import check_pins, wipe
+from interpose.finish.guarantees import wipe
 from interpose.finish.measures import acceleration
 from interpose.finish.path import spans as path_spans
 from interpose.finish.report import JointMoments, Provenance
@@ -26,7 +27,7 @@ from interpose.geometry.time import runs
 from interpose.methods import auto, registry
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw, Sampler
-from interpose.observation import Gap, Observation, Part, timeline
+from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken
 from interpose.observation.part import lay
 from interpose.skeletons import find_humanoid
@@ -63,6 +64,7 @@ def fill(
     action: str = "",
     parts: Sequence[Part] = (),
     path: Mapping[int, Any] | None = None,
+    pins: Sequence[Pin] = (),
     temperature: float = 1.0,
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
@@ -81,6 +83,7 @@ def fill(
         action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
         parts: poses of single joints that other clips give inside of the gaps.
         path: x and z in metres that the root is led over, by frame; inside of gaps of the whole pose.
+        pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
         temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
 
     Returns:
@@ -88,16 +91,17 @@ def fill(
 
     Raises:
         RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
-            observed; a part that does not fit; a path outside of the gaps.
+            observed; a part that does not fit; a path, or a pin, outside of the gaps.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
-    check_pins(observation)
+    observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, parts)
+    pinning.check(clip, observation)
     brief = _momentary(clip, observation) if isinstance(gaps, Observation) else None
     if brief and method in ("auto", "spline"):
         mended, seen = _mended(clip, observation, brief)
         rest = fill(
-            mended, seen, method, max_gap, only, seed, methods, progress, action, (), path, temperature
+            mended, seen, method, max_gap, only, seed, methods, progress, action, (), path, (), temperature
         )
         return _with_moments(rest, clip, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):

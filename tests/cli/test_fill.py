@@ -391,6 +391,30 @@ def test_a_path_is_in_the_file_s_own_unit_and_its_report_is_replayed(run, take):
     assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
 
 
+def test_a_pin_is_in_the_file_s_own_unit_and_its_report_is_replayed(run, take):
+    clip = load(take)
+    hand = clip.skeleton.index("LeftHand")
+    there = clip.positions()[75, hand] / clip.source.unit + [0, 5, 0]
+    text = "LeftHand@74:77:" + ",".join(f"{x:.4f}" for x in there)
+    done = run("fill", "take.bvh", "--gap", "60:90", "--pin", text, "--json")
+    assert done.code == 0
+    assert done.json["pinned"] == [text]
+    assert done.json["gaps"][0]["pins"] < 0.1
+    met = load(take.with_name("take.filled.bvh")).positions()[74:77, hand]
+    np.testing.assert_allclose(met / clip.source.unit, np.tile(there, (3, 1)), atol=0.02)
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh").code == 0
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "text", ["LeftHand", "LeftHand@75", "LeftHand@75:1,2", "LeftHand@77:75:1,2,3", "75:1,2,3"]
+)
+def test_a_pin_that_cannot_be_read(run, take, text):
+    done = run("fill", "take.bvh", "--gap", "60:90", "--pin", text)
+    assert done.code == 2
+    assert f"cannot read --pin {text}" in done.err
+
+
 @pytest.mark.parametrize("text", ["75", "75:1", "75:1,nan", "75:1,2,3", "a:1,2", "75:1,"])
 def test_a_path_that_cannot_be_read(run, take, text):
     done = run("fill", "take.bvh", "--gap", "60:90", "--path", text)

@@ -30,6 +30,7 @@ def fill(
     from_range: str | None = None,
     at: int | None = None,
     path: list[str] = [],  # noqa: B006
+    pin: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str | None = None,
     max_gap: int | None = None,
@@ -53,6 +54,7 @@ def fill(
       interpose fill take.bvh --max-gap 90 --only-gap 2 --method spline
       interpose fill take.bvh --gaps take.filled.json -o again.bvh   (once more)
       interpose fill take.bvh --gap 120:160 --path 140:35,-120
+      interpose fill take.bvh --gap 120:160 --pin LeftHand@140:35,142,-20
       interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
         --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
 
@@ -67,6 +69,8 @@ def fill(
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
+        pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
+            to hold it there. May be repeated.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         max_gap: leave gaps of more than this many frames open, and list them.
@@ -84,6 +88,7 @@ def fill(
         part_of,
         parts_to_dict,
         path_of,
+        pins_of,
         reading_of,
         roles_of,
     )
@@ -91,8 +96,8 @@ def fill(
     clip = reading_of(gaps, reading).load(file, roles_of(gaps))
     parts = part_of(from_, from_range, at, joints, reading)
     request = from_options(file, clip, gap, [] if parts else joints, gaps, reading)
-    request = replace(request, parts=request.parts + parts, path=request.path + path)
-    points = path_of(request.path, clip)
+    request = replace(request, parts=request.parts + parts, path=request.path + path, pins=request.pins + pin)
+    points, pins = path_of(request.path, clip), pins_of(request.pins, clip)
     if method is not None:
         check_method(method)
         request = replace(request, method=method, methods={})
@@ -121,10 +126,12 @@ def fill(
             action=request.action,
             parts=[part for _, part in request.parts],
             path=points,
+            pins=pins,
         )
     why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
     more |= {"path": request.path} if request.path else {}
+    more |= {"pinned": request.pins} if request.pins else {}
     return finish(
         "fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force, more=more
     )

@@ -32,6 +32,7 @@ UNITS = {
     "penetration": "cm",
     "liveliness": "share of the motion around",
     "path": "cm",
+    "pins": "cm",
     "drift": "cm",
 }
 

@@ -14,7 +14,7 @@ from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
 from interpose.errors import RequestError, unknown
 from interpose.formats.place import vectors_inside
-from interpose.observation import Gap, Part
+from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import scan, to_gaps
 
@@ -33,6 +33,7 @@ class Request:
         action: what the motion is, for methods that know actions.
         parts: poses of single joints from other clips, each with the path of its clip.
         path: points of the floor, as they were written.
+        pins: places of joints, as they were written.
     """
 
     gaps: list[Gap]
@@ -45,6 +46,7 @@ class Request:
     action: str = ""
     parts: list[tuple[Path, Part]] = field(default_factory=list)
     path: list[str] = field(default_factory=list)
+    pins: list[str] = field(default_factory=list)
 
 
 def from_options(
@@ -174,6 +176,30 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
     return points
 
 
+def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
+    """Pins "JOINT@FRAME:X,Y,Z" or "JOINT@START:STOP:X,Y,Z" of --pin, in the file's own unit and axes."""
+    unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
+    found = []
+    for text in texts:
+        match = re.fullmatch(r"(.+)@(\d+)(?::(\d+))?:([^:,]+),([^:,]+),([^:,]+)", text)
+        try:
+            where = np.array([float(number) for number in match.groups()[3:]] if match else [np.nan])
+        except ValueError:
+            where = np.array([np.nan])
+        start = int(match[2]) if match else 0
+        stop = int(match[3]) if match and match[3] else start + 1
+        if match is None or not np.isfinite(where).all() or stop <= start:
+            raise RequestError(
+                f"cannot read --pin {text}",
+                "a pin is a joint, a frame or a range, and three coordinates in the file's own unit and axes",
+                "Write for example --pin LeftHand@130:35,142,-20, or LeftHand@130:140:35,142,-20 to hold it.",
+            )
+        clip.skeleton.index(match[1])
+        frames = np.arange(start, stop)
+        found.append(Pin(match[1], frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
+    return found
+
+
 def parts_to_dict(parts: list[tuple[Path, Part]]) -> list[dict[str, Any]]:
     """For a report, so that it can be replayed."""
     return [
@@ -211,6 +237,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Rea
         str(content.get("action", "")),
         parts,
         list(content.get("path", [])),
+        list(content.get("pinned", [])),
     )
 
 

@@ -1,6 +1,6 @@
 """The one place where a clip is completed: any method, then the guarantees.
 
-Precedence when they collide: observed values, then bones, then seams, then feet.
+Precedence when they collide: observed values, then bones, then pins, then seams, then feet.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, measures, penetration, seams
+from interpose.finish import feet, measures, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
@@ -24,7 +24,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods.classical import Linear, Spline
 from interpose.methods.protocol import Method, Raw
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Pin
 
 # Positions further out than this (metres) are as good as no numbers.
 NOWHERE = 1e4
@@ -107,8 +107,8 @@ def complete(
         first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
     Raises:
-        RequestError: the observation does not fit the clip or has pins, nothing fills a gap, or a point of
-            the path lies in no gap of the whole pose with known frames on both sides.
+        RequestError: the observation or one of its pins does not fit the clip, nothing fills a gap, or a
+            point of the path lies in no gap of the whole pose with known frames on both sides.
     """
     if observation.rotation.shape != clip.rotation.shape[:2]:
         raise RequestError(
@@ -117,7 +117,8 @@ def complete(
             "Make it from the same clip, for example with Observation.from_gaps.",
         )
     fallback = fallback or Spline()
-    check_pins(observation)
+    if observation.pins:
+        return _pinned(clip, observation, method, seed, fallback, limit, path, first)
     hidden = wipe(clip, observation)
     known = _trusted(hidden, observation)
     if path:
@@ -265,6 +266,61 @@ def _along(
     return replace(done, report=replace(done.report, gaps=reports))
 
 
+@dataclass
+class _Told:
+    """A method that is told pins, which those who know nothing of pins leave alone."""
+
+    name: str
+    method: Method
+    pins: tuple[Pin, ...]
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        return self.method.refuses(clip, gap)
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        return self.method.complete(clip, replace(observation, pins=self.pins), seed)
+
+
+def _pinned(
+    clip: Clip,
+    observation: Observation,
+    method: Method,
+    seed: int | None,
+    fallback: Method,
+    limit: float | None,
+    path: Mapping[int, np.ndarray] | None,
+    first: int,
+) -> Completion:
+    """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
+    pins.check(clip, observation)
+    asked, free = observation.pins, replace(observation, pins=())
+    told = _Told(method.name, method, asked)
+    body = complete(clip, free, told, seed, fallback, limit, path, first)
+    known = _trusted(clip, free)
+    met = pins.meet(body.clip, known, asked)
+    layer = Layer(method.name, met, body.raw, np.zeros_like(known.rotation))
+    done = _told_of(body, complete(clip, free, layer, seed, layer, limit, first=first))
+    # Seams may have been softened beside a pin, which comes first.
+    done = replace(done, clip=pins.meet(done.clip, known, asked))
+    off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
+
+    def judged(gap: GapReport) -> GapReport:
+        inside = [one for one in off if gap.start <= one[1] < gap.stop]
+        if not inside:
+            return gap
+        worst = max(inside, key=lambda one: one[2] / (100 * one[0].tolerance))
+        notes = [f"the pins are met within {max(distance for *_, distance in inside):.2f} cm"]
+        if worst[2] > 100 * worst[0].tolerance:
+            notes.append(
+                f"flagged: {worst[0].joint} misses its pin at frame {first + worst[1]} by {worst[2]:.1f} cm: "
+                "it is out of reach"
+            )
+        return replace(gap, pins=max(distance for *_, distance in inside), notes=(*gap.notes, *notes))
+
+    reports = [judged(gap) for gap in done.report.gaps]
+    return replace(done, report=replace(done.report, gaps=reports))
+
+
 def _told_of(body: Completion, done: Completion) -> Completion:
     """What was laid on a body, or led, with what its report says of gaps that a simpler method filled."""
     before = {
@@ -287,16 +343,6 @@ def _told_of(body: Completion, done: Completion) -> Completion:
     fell = (body.provenance == Provenance.FALLBACK) & (done.provenance != Provenance.OBSERVED)
     provenance = np.where(fell, Provenance.FALLBACK, done.provenance).astype(done.provenance.dtype)
     return replace(done, provenance=provenance, report=replace(done.report, gaps=reports))
-
-
-def check_pins(observation: Observation) -> None:
-    """RequestError when there are pins: better refused than passed over."""
-    if observation.pins:
-        raise RequestError(
-            "pins cannot be met yet",
-            "no method that is here knows how to meet a global position",
-            "Leave the pins out; what is observed of rotations and of the root is kept exactly.",
-        )
 
 
 def wipe(clip: Clip, observation: Observation) -> Clip:

@@ -49,6 +49,7 @@ class GapReport:
         liveliness: how much the body moves in the middle of the gap, as a share of how much around it; a note
             says so where it hardly moves.
         path: cm, by how much the root misses points of the path that was asked for.
+        pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
@@ -72,6 +73,7 @@ class GapReport:
     penetration: float | None = None
     liveliness: float | None = None
     path: float | None = None
+    pins: float | None = None
     drift: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0

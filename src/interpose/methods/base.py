@@ -84,6 +84,7 @@ class Base:
             known[before] & known[after],
             label,
             bones,
+            pinned(observation, body.mapping, len(times), card.fps / clip.fps, body.scale),
         )
         said = kinematics.global_rotations(said_local, PARENTS)
         missing = ~known.all(axis=1)
@@ -122,8 +123,32 @@ def knowledge(observation: Observation, mapping: Mapping) -> np.ndarray:
     return found
 
 
+def pinned(
+    observation: Observation, mapping: Mapping, frames: int, pace: float, scale: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where pins say that canonical joints are (T, 22, 3), in metres of the scaled body, and of which (T, 22)
+    they do.
+
+    pace: frames of the network to one of the clip; a pin speaks of the nearest one.
+    """
+    rows = {joint: row for row, joint in zip(*mapping.mapped)}
+    places, said = np.zeros((frames, len(PARENTS), 3)), np.zeros((frames, len(PARENTS)), bool)
+    for pin in observation.pins:
+        row = rows.get(mapping.skeleton.index(pin.joint))
+        if row is not None and pin.position is not None:
+            at = np.minimum(np.round(np.asarray(pin.frames) * pace).astype(int), frames - 1)
+            places[at, row], said[at, row] = np.asarray(pin.position) * scale, True
+    return places, said
+
+
 def run(
-    path: Path, local: np.ndarray, root: np.ndarray, known: np.ndarray, label: int, bones: np.ndarray
+    path: Path,
+    local: np.ndarray,
+    root: np.ndarray,
+    known: np.ndarray,
+    label: int,
+    bones: np.ndarray,
+    pins: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Run the graph on one motion at 30 fps.
 
@@ -134,19 +159,20 @@ def run(
         known: (T, 23) booleans.
         label: index of the action.
         bones: (22, 3) metres.
+        pins: (T, 22, 3) metres, where joints are to be, and (T, 22) of which joints that is said.
 
     Returns:
         The same rotations and hips, complete; float64.
     """
     # Far from the origin float32 would lose millimetres.
     origin = root[np.argmax(known[:, -1])] * [1.0, 0.0, 1.0]
-    shape = (1, *local.shape[:2])
+    places, said = pins
     feed = {
         "local": np.where(known[:, :-1, None], local, [1.0, 0.0, 0.0, 0.0])[None].astype(np.float32),
         "root": np.where(known[:, -1:], root - origin, 0.0)[None].astype(np.float32),
         "known": known[None].astype(np.float32),
-        "pinned": np.zeros((*shape, 3), np.float32),
-        "pins": np.zeros(shape, bool),
+        "pinned": np.where(said[..., None], places - origin, 0.0)[None].astype(np.float32),
+        "pins": said[None],
         "label": np.array([label]),
         "bones": bones[None].astype(np.float32),
     }
@@ -155,7 +181,13 @@ def run(
 
 
 def run_long(
-    card: weights.Card, local: np.ndarray, root: np.ndarray, known: np.ndarray, label: int, bones: np.ndarray
+    card: weights.Card,
+    local: np.ndarray,
+    root: np.ndarray,
+    known: np.ndarray,
+    label: int,
+    bones: np.ndarray,
+    pins: tuple[np.ndarray, np.ndarray],
 ) -> tuple[np.ndarray, np.ndarray]:
     """Run the graph on a motion of any length, hole by hole; arguments and result as in `run`.
 
@@ -169,7 +201,9 @@ def run_long(
             last = min(end + CONTEXT, len(root)) if short else begin + card.max_gap
             first = max(begin - CONTEXT, 0)
             part = slice(first, last)
-            said = run(card.onnx, local[part], root[part], known[part], label, bones)
+            said = run(
+                card.onnx, local[part], root[part], known[part], label, bones, (pins[0][part], pins[1][part])
+            )
             stop = end if short else begin + card.max_gap // 2
             inside = slice(begin, stop)
             own = slice(begin - first, stop - first)

@@ -74,6 +74,16 @@ class Pin:
     orientation: np.ndarray | None = None
     tolerance: float = 0.001
 
+    def slice(self, start: int, stop: int) -> Pin:
+        """What it says of the frames start to stop - 1, counted from start."""
+        frames = np.asarray(self.frames)
+        inside = (frames >= start) & (frames < stop)
+        position, orientation = (
+            None if value is None else np.asarray(value, float)[inside]
+            for value in (self.position, self.orientation)
+        )
+        return replace(self, frames=frames[inside] - start, position=position, orientation=orientation)
+
 
 @dataclass(frozen=True, eq=False)
 class Observation:
@@ -182,11 +192,11 @@ class Observation:
         return found
 
     def slice(self, start: int, stop: int) -> Observation:
-        """The observation of frames start to stop - 1 (pins are left out)."""
+        """The observation of frames start to stop - 1, and what pins say of them."""
         return replace(
             self,
             rotation=self.rotation[start:stop],
             translation=self.translation[start:stop],
             trust=self.trust[start:stop],
-            pins=(),
+            pins=tuple(one for pin in self.pins if len((one := pin.slice(start, stop)).frames)),
         )

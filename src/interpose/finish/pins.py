@@ -1,0 +1,214 @@
+"""Pins: joints that are to be at a place, or to be turned, at some frames of a gap.
+
+The motion is changed as little as that takes: what a pin is off by comes and goes smoothly between the frames
+around it, and all joints that are free share it, feet and the other pins last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain, repeat
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.finish import feet
+from interpose.finish.solve import BLOCK, refine
+from interpose.geometry import rotations
+from interpose.geometry.time import runs
+from interpose.methods.bodies import no_humanoid
+from interpose.observation import Observation, Pin
+from interpose.skeletons import find_mapping
+
+# How much the place of every other joint counts beside a pin, round by round: first all give way together,
+# then the pins alone decide; and how many times more those of feet do.
+SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
+# Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
+# after those at most.
+STEP, SHORT, STILL, ROUNDS = 0.25, 0.005, 1e-6, 40
+
+
+def check(clip: Clip, observation: Observation) -> None:
+    """Raise RequestError for pins of joints or frames that are not there, of values that are known already,
+    or that say nothing."""
+    placed = observation.positions(clip.skeleton)
+    turned = _turned(clip.skeleton, observation)
+    for pin in observation.pins:
+        joint, frames = clip.skeleton.index(pin.joint), np.asarray(pin.frames)
+        if pin.position is None and pin.orientation is None:
+            raise RequestError(
+                f"the pin of {pin.joint} says nothing", "it has neither a position nor an orientation"
+            )
+        for value, width in ((pin.position, 3), (pin.orientation, 4)):
+            if value is not None and not (
+                np.shape(value) == (len(frames), width) and np.isfinite(value).all()
+            ):
+                raise RequestError(
+                    f"the pin of {pin.joint} does not fit",
+                    f"{len(frames)} frames need as many rows of {width} finite numbers",
+                )
+        outside = (frames < 0) | (frames >= len(clip))
+        if outside.any():
+            raise RequestError(
+                f"there is no frame {frames[outside][0]} for the pin of {pin.joint}",
+                f"the clip has {len(clip)} frames, counted from 0",
+            )
+        known = (pin.position is not None) & placed[frames, joint]
+        known |= (pin.orientation is not None) & turned[frames, joint]
+        if known.any():
+            raise RequestError(
+                f"{pin.joint} cannot be pinned at frame {frames[known][0]}",
+                "where it is there follows from what is observed, which comes back unchanged",
+                "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
+            )
+
+
+def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
+    """The clip with its pins met, as far as its bones reach.
+
+    Args:
+        clip: (F) complete.
+        known: what may not be changed.
+        pins: as `check` lets them pass.
+    """
+    for start, stop in runs(~known.frames):
+        # The frames beside a gap are its edges: nothing of them can change.
+        lo, hi = max(0, start - 1), min(len(clip), stop + 1)
+        edges = [frame - lo for frame in (start - 1, stop) if lo <= frame < hi]
+        if some := [one for pin in pins if len((one := pin.slice(lo, hi)).frames)]:
+            part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges)
+            rotation, translation = clip.rotation.copy(), clip.translation.copy()
+            rotation[start:stop] = part.rotation[start - lo : stop - lo]
+            translation[start:stop] = part.translation[start - lo : stop - lo]
+            clip = clip.with_motion(rotation, translation)
+    return clip
+
+
+def missed(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]]:
+    """Each pin with a position at each of its frames, and by how many metres the joint misses it there."""
+    placed = clip.positions()
+    for pin in pins:
+        if pin.position is not None:
+            off = np.linalg.norm(placed[pin.frames, clip.skeleton.index(pin.joint)] - pin.position, axis=1)
+            for frame, distance in zip(pin.frames, off):
+                yield pin, int(frame), float(distance)
+
+
+def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) -> Clip:
+    placed = [pin for pin in pins if pin.position is not None]
+    turned = [pin for pin in pins if pin.orientation is not None]
+    # Turning a joint moves what hangs on it, so where both are asked for both are done twice.
+    for _ in range(2 if placed and turned else 1):
+        if placed:
+            clip = _place(clip, known, placed, edges)
+        for pin in turned:
+            clip = _turn(clip, known, pin, edges)
+    return clip
+
+
+def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) -> Clip:
+    """Bring joints to their places by turning all that is free, frame by frame."""
+    skeleton = clip.skeleton
+    pinned = [skeleton.index(pin.joint) for pin in pins]
+    mapping = find_mapping(skeleton)
+    body = range(len(skeleton)) if no_humanoid(mapping) else mapping.mapped[1]
+    joints = tuple(dict.fromkeys([*body, *pinned]))
+    start = clip.positions()
+    wanted, off = start[:, joints].copy(), np.zeros((len(clip), len(joints)))
+    for pin, joint in zip(pins, pinned):
+        change = _between(len(clip), np.asarray(pin.frames), pin.position - start[pin.frames, joint], edges)
+        wanted[:, joints.index(joint)] += change
+        off[:, joints.index(joint)] += np.abs(change).max(axis=1)
+    moved = np.flatnonzero(off.max(axis=1) > 1e-6)
+    if not moved.size:
+        return clip
+    rows = [joints.index(joint) for joint in pinned]
+    heavy = [joints.index(joint) for joint in feet.ends(skeleton) if joint in joints]
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    for i in range(0, len(moved), BLOCK):
+        at = moved[i : i + BLOCK]
+        part = clip.with_motion(clip.rotation[at], clip.translation[at])
+        seen = Observation(known.rotation[at], known.translation[at])
+        rotation[at], translation[at] = _approach(part, seen, joints, wanted[at], rows, heavy)
+    return clip.with_motion(rotation, translation)
+
+
+def _approach(
+    clip: Clip,
+    known: Observation,
+    joints: tuple[int, ...],
+    wanted: np.ndarray,
+    rows: list[int],
+    heavy: list[int],
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rotations and translations with which the joints in `rows` come to where they are wanted (F, n, 3).
+
+    In steps, each frame for itself: all the way at once joints would turn past what is far away, and swing
+    about what is out of reach. Steps that come no nearer are taken back, and shorter ones tried.
+    """
+
+    def off(some: Clip) -> np.ndarray:
+        return np.asarray(wanted[:, rows] - some.positions()[:, [joints[row] for row in rows]])
+
+    left = off(clip)
+    step = np.full(len(clip), STEP)
+    for share in chain(SHARES, repeat(SHARES[-1], ROUNDS)):
+        far = np.linalg.norm(left, axis=-1)
+        if share == SHARES[-1] and ((far.max(axis=1) < STILL) | (step < SHORT)).all():
+            break
+        goal = wanted.copy()
+        goal[:, rows] -= left * np.maximum(1 - step[:, None] / np.maximum(far, 1e-9), 0.0)[..., None]
+        weights = np.full((len(clip), len(joints)), share)
+        weights[:, heavy] *= FEET
+        weights[:, rows] = 1.0
+        tried = refine(clip, known, joints, goal, weights)
+        there = off(tried)
+        nearer = np.linalg.norm(there, axis=-1).sum(axis=1) < far.sum(axis=1) - STILL
+        left = np.where(nearer[:, None, None], there, left)
+        step = np.where(nearer, step, step / 2)
+        clip = clip.with_motion(
+            np.where(nearer[:, None, None], tried.rotation, clip.rotation),
+            np.where(nearer[:, None, None], tried.translation, clip.translation),
+        )
+    return clip.rotation, clip.translation
+
+
+def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
+    """Turn a joint as a pin says, where its own rotation is free."""
+    joint = clip.skeleton.index(pin.joint)
+    turned, _ = clip.kinematics()
+    off = rotations.log(rotations.multiply(pin.orientation, rotations.conjugate(turned[pin.frames, joint])))
+    change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges))
+    done, parent = rotations.multiply(change, turned[:, joint]), clip.skeleton.parents[joint]
+    if parent >= 0:
+        done = rotations.multiply(rotations.conjugate(turned[:, parent]), done)
+    rotation = clip.rotation.copy()
+    rotation[:, joint] = np.where(known.rotation[:, joint, None], rotation[:, joint], done)
+    return clip.with_motion(rotation, clip.translation)
+
+
+def _between(frames: int, at: np.ndarray, values: np.ndarray, edges: list[int]) -> np.ndarray:
+    """(F, n) through values (k, n) at some frames, nothing at the edges, smooth and never further off.
+
+    At an end that is no edge, as where a clip ends within the gap, the value holds.
+    """
+    # With a second one beyond it an edge is left and reached at rest.
+    beyond = [edge + (1 if edge > at.max() else -1) for edge in edges]
+    knots = np.concatenate([at, edges, beyond]).astype(int)
+    points = np.concatenate([values, np.zeros((2 * len(edges), values.shape[1]))])
+    knots, first = np.unique(knots, return_index=True)
+    if len(knots) == 1:
+        return np.repeat(points[first], frames, axis=0)
+    inside = np.clip(np.arange(frames), knots[0], knots[-1])
+    return np.asarray(PchipInterpolator(knots, points[first])(inside))
+
+
+def _turned(skeleton: Skeleton, observation: Observation) -> np.ndarray:
+    """(F, J) True where a joint's global rotation follows from what is known."""
+    known = observation.rotation.copy()
+    for joint, parent in enumerate(skeleton.parents):
+        if parent >= 0:
+            known[:, joint] &= known[:, parent]
+    return known

@@ -1,0 +1,131 @@
+"""Pins on a real walk: met where bones allow it, smoothly, and nothing observed changes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from interpose import tasks
+from interpose.errors import RequestError
+from interpose.finish import feet, pins, seams
+from interpose.geometry import rotations
+from interpose.observation import Gap, Observation, Pin
+
+GAP = Gap(70, 100)
+ARM = ("LeftArm", "LeftForeArm", "LeftHand")
+
+
+def lifted(clip, frame=85, up=(0.0, 0.4, 0.1), joint="LeftHand"):
+    """A pin some way from where the joint is."""
+    return Pin(joint, np.array([frame]), clip.positions()[[frame], clip.skeleton.index(joint)] + up)
+
+
+@pytest.mark.parametrize("method", ["spline", "small", "cae"])
+def test_a_hand_is_where_it_is_pinned_and_all_observed_values_are_the_same(cmu_walk, method):
+    pin = lifted(cmu_walk)
+    done = tasks.fill(cmu_walk, [GAP], method, pins=[pin])
+    hand = cmu_walk.skeleton.index("LeftHand")
+    np.testing.assert_allclose(done.clip.positions()[85, hand], pin.position[0], atol=1e-3)
+    for at in (slice(0, 70), slice(100, None)):
+        assert done.clip.rotation[at].tobytes() == cmu_walk.rotation[at].tobytes()
+        assert done.clip.translation[at].tobytes() == cmu_walk.translation[at].tobytes()
+    gap = done.report.gaps[0]
+    assert gap.pins is not None
+    assert gap.pins < 0.1
+    assert gap.method == method, gap.notes
+
+
+def test_feet_stay_and_velocities_do_not_jump(cmu_walk):
+    seen = Observation.from_gaps(cmu_walk, [GAP])
+    free, done = (tasks.fill(cmu_walk, [GAP], "spline", pins=some).clip for some in ((), [lifted(cmu_walk)]))
+    ends = feet.ends(cmu_walk.skeleton)
+    moved = np.linalg.norm(done.positions() - free.positions(), axis=-1)
+    assert moved[GAP.start : GAP.stop, ends].max() < 0.01
+    hand = cmu_walk.skeleton.index("LeftHand")
+    assert moved[85, hand] > 0.3
+    jumps = np.linalg.norm(np.diff(done.positions(), n=2, axis=0), axis=-1)[GAP.start - 1 : GAP.stop]
+    assert jumps.max() < 2 * seams.PEAKS * seams.limit(cmu_walk, seen)
+
+
+def test_a_place_is_held_for_as_long_as_it_is_pinned(cmu_walk):
+    frames = np.arange(80, 90)
+    where = np.tile(lifted(cmu_walk).position, (10, 1))
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[Pin("LeftHand", frames, where)])
+    hand = done.clip.positions()[frames, cmu_walk.skeleton.index("LeftHand")]
+    np.testing.assert_allclose(hand, where, atol=1e-3)
+
+
+def test_what_is_out_of_reach_is_met_as_nearly_as_bones_allow_and_said(cmu_walk):
+    """With the body observed a hand comes no nearer than an arm is long."""
+    skeleton, placed = cmu_walk.skeleton, cmu_walk.positions()
+    shoulder, elbow, hand = (skeleton.index(name) for name in ARM)
+    far = placed[85, shoulder] + [2.0, 1.0, 0.0]
+    pin = Pin("LeftHand", np.array([85]), far[None])
+    done = tasks.fill(cmu_walk, [Gap(70, 100, ARM)], "spline", pins=[pin])
+    arm = sum(np.linalg.norm(placed[85, b] - placed[85, a]) for a, b in ((shoulder, elbow), (elbow, hand)))
+    nearest = np.linalg.norm(far - placed[85, shoulder]) - arm
+    off = np.linalg.norm(done.clip.positions()[85, hand] - far)
+    assert nearest <= off < nearest + 0.02
+    gap = done.report.gaps[0]
+    assert gap.pins == pytest.approx(100 * off)
+    assert "out of reach" in " ".join(gap.notes)
+    others = [j for j in range(len(skeleton)) if skeleton.names[j] not in ARM]
+    assert (done.clip.rotation[:, others] == cmu_walk.rotation[:, others]).all()
+
+
+def test_an_orientation_is_met_with_a_place(cmu_walk):
+    turned = rotations.about("Y", np.array([0.8]))
+    pin = replace(lifted(cmu_walk), orientation=turned)
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip
+    globals_, placed = done.kinematics()
+    hand = done.skeleton.index("LeftHand")
+    assert rotations.angle(globals_[85, hand], turned[0]) < 1e-3
+    np.testing.assert_allclose(placed[85, hand], pin.position[0], atol=1e-3)
+
+
+def test_the_result_follows_when_the_room_is_turned(cmu_walk):
+    turn, away = rotations.about("Y", np.array(1.1)), np.array([3.0, 0.0, -2.0])
+    pin = lifted(cmu_walk)
+    root = cmu_walk.translated.index(0)
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    translation[:, root] = rotations.rotate(turn, translation[:, root]) + away
+    moved = cmu_walk.with_motion(rotation, translation)
+    there = replace(pin, position=rotations.rotate(turn, pin.position) + away)
+    a = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip.positions()
+    b = tasks.fill(moved, [GAP], "spline", pins=[there]).clip.positions()
+    np.testing.assert_allclose(rotations.rotate(turn, a) + away, b, atol=1e-4)
+
+
+def test_a_forecast_may_end_at_a_pin(cmu_walk):
+    """Where the clip ends within the gap there is no frame behind the pin to come back to."""
+    cut = cmu_walk.slice(0, 100)
+    done = tasks.fill(cut, [GAP], "spline", pins=[lifted(cmu_walk, 95)]).clip
+    hand = cut.skeleton.index("LeftHand")
+    np.testing.assert_allclose(done.positions()[95, hand], lifted(cmu_walk, 95).position[0], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("pin", "why"),
+    [
+        (Pin("LeftHand", np.array([20]), np.zeros((1, 3))), "cannot be pinned at frame 20"),
+        (Pin("LeftHand", np.array([900]), np.zeros((1, 3))), "no frame 900"),
+        (Pin("LeftHand", np.array([80]), np.zeros((2, 3))), "does not fit"),
+        (Pin("LeftHand", np.array([80]), np.full((1, 3), np.nan)), "does not fit"),
+        (Pin("LeftHand", np.array([80])), "says nothing"),
+        (Pin("Nose", np.array([80]), np.zeros((1, 3))), "unknown joint"),
+    ],
+)
+def test_pins_that_make_no_sense_are_refused(cmu_walk, pin, why):
+    with pytest.raises(RequestError, match=why):
+        tasks.fill(cmu_walk, [GAP], "spline", pins=[pin])
+
+
+def test_pins_are_cut_with_their_observation(cmu_walk):
+    seen = replace(Observation.from_gaps(cmu_walk, [GAP]), pins=(lifted(cmu_walk),))
+    (pin,) = seen.slice(80, 120).pins
+    assert pin.frames.tolist() == [5]
+    assert seen.slice(0, 80).pins == ()
+    assert pins.meet(cmu_walk, Observation.full(cmu_walk), seen.pins) is cmu_walk
