@@ -4,6 +4,7 @@ SHELL   := /bin/sh
 PYTHON  ?=
 PYTHONS := $(or $(PYTHON),python3 python3.13 python3.12 python3.11 python3.14 python)
 CORE    := .venv
+NODE    := tests/node
 TEST    := .venv-test
 PIP     := -m pip --disable-pip-version-check --quiet
 PINS    := -c constraints.txt
@@ -17,7 +18,7 @@ help: ## this list
 demo: $(CORE)/.installed ## fill a gap in a real clip and show the result (installs the core, no torch)
 	@$(CORE)/bin/interpose demo
 
-test: lint ## all checks and all tests (installs torch)
+test: lint $(NODE)/.installed ## all checks and all tests (installs torch)
 	@OMP_NUM_THREADS=1 $(TEST)/bin/python -m pytest
 
 lint: $(TEST)/.installed ## style, types and the direction of imports
@@ -32,6 +33,7 @@ format: $(TEST)/.installed ## put the code into the one format
 
 clean: ## remove environments, caches and build results
 	rm -rf $(CORE) $(TEST) build dist .mypy_cache .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(NODE)/node_modules $(NODE)/.installed
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # The first Python that is new enough and can make environments; PYTHON=... chooses another.
@@ -52,6 +54,12 @@ endef
 $(CORE)/.installed: pyproject.toml constraints.txt
 	$(MAKE_VENV)
 	@$(CORE)/bin/python $(PIP) install $(PINS) --editable .
+	@touch $@
+
+# The runtime of browsers, for one test: without Node it is skipped.
+$(NODE)/.installed: $(NODE)/package-lock.json
+	@! command -v npm >/dev/null || npm ci --prefix $(NODE) --ignore-scripts --no-audit --no-fund --silent || \
+	    echo "onnxruntime-web could not be installed: the test of graphs in a browser is skipped." >&2
 	@touch $@
 
 # torch comes first and by its exact pin: a bare range may replace a CPU build that is already there.

@@ -112,7 +112,7 @@ def test_what_is_known_stays_and_what_is_not_has_no_influence(model, given):
     assert torch.equal(answer.local[held], local[held])
     assert torch.equal(answer.root, root)
     spoiled = torch.where(held[..., None], local, torch.randn_like(local))
-    again = model.complete(spoiled, root, known, torch.full_like(placed, torch.nan), pins, label, bones)
+    again = model.complete(spoiled, root, known, torch.full_like(placed, 1e3), pins, label, bones)
     assert torch.equal(again.motion.local, answer.local)
 
 
@@ -191,10 +191,12 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
             if value.numel() >= 1024:  # stored in 16 bits
                 value.copy_(value.half())
         expected = model(*(v.float() if v.is_floating_point() else v for v in given))
-    local, root, known, *_, bones = (v[0].numpy() for v in given)
-    said = method.run(card.onnx, local, root, known == 1, int(given[5][0]), bones)
-    assert rotations.angle(said[0], expected[0][0].double().numpy()).max() < 1e-3
-    assert np.allclose(said[1], expected[1][0], atol=1e-4)
+    local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
+    said = method.run(card.onnx, local, root, known == 1, int(given[5][0]), bones, (pinned, pins))
+    assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
+    assert np.allclose(said.root, expected[1][0], atol=1e-4)
+    assert np.allclose(said.stands, expected[2][0], atol=1e-4)
+    assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
 
 
 def test_it_completes_clips(trained, cmu_walk, monkeypatch):

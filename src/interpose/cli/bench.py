@@ -334,6 +334,33 @@ def every(
 
 
 @bench.command
+def reliability(
+    *,
+    method: str = "small",
+    most: int | None = 40,
+    plot: Path | None = None,
+    asked: Tabled = Tabled(),
+) -> None:
+    """Does a network know when it is wrong? Expected errors beside measured ones, frame by frame.
+
+    Try:
+      interpose bench reliability --data data --plot reliability.svg
+
+    Args:
+        method: one that says what it expects to be off by.
+        most: windows of each data set.
+        plot: where to draw it, as SVG.
+    """
+    from interpose.evaluation.reliability import run
+
+    with _bar() as progress:
+        result = run(asked.data, method, asked.split, most, progress)
+    _show(result, asked)
+    if plot:
+        result.plot(plot)
+
+
+@bench.command
 def recipes(
     *runs: Annotated[Path, Parameter(name="RUNS")],
     json: bool = False,

@@ -34,6 +34,7 @@ UNITS = {
     "path": "cm",
     "pins": "cm",
     "drift": "cm",
+    "expected": "cm",
 }
 
 

@@ -31,6 +31,9 @@ NOWHERE = 1e4
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
 # pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
 DULL = 0.33
+# Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
+# gaps of a second.
+DOUBT = 0.15
 # What should be known on either side of a gap for a network to fill it well: so many seconds, and this share
 # of the gap (Kaufmann et al. 2020, section 4.2: a sixth, for walks). Errors of validation performers are then
 # within 10 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
@@ -574,6 +577,7 @@ def _report(
     scant = _scant(known, gap, finished.fps) if networks else None
     never = [] if own and "model" in raw.notes else _never(known, gap, skeleton.names)
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
+    risk = raw.expected[gap.start : gap.stop] if own and raw.expected is not None else None
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,
@@ -594,10 +598,12 @@ def _report(
         penetration=_centi(inside[0] if inside else None),
         liveliness=alive,
         drift=_centi(_drift(raw.notes, gap)) if own else None,
+        expected=_centi(float(np.mean(risk))) if risk is not None else None,
         notes=(
             *span.notes,
             *((inside[1],) if inside and inside[1] else ()),
             *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
+            *((_doubtful(risk, gap, first),) if risk is not None and risk.mean() > DOUBT else ()),
             *((scant,) if scant else ()),
             *((_rests(never, span.method),) if never else ()),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
@@ -617,6 +623,13 @@ def _dull(alive: float, gap: Gap, first: int) -> str:
     return (
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
         f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
+    )
+
+
+def _doubtful(risk: np.ndarray, gap: Gap, first: int) -> str:
+    return (
+        f"flagged: joints are expected to be off by {100 * risk.mean():.0f} cm: nothing tells what happens "
+        f"here. A key near frame {first + gap.start + int(risk.argmax())} helps most"
     )
 
 

@@ -51,6 +51,7 @@ class GapReport:
         path: cm, by how much the root misses points of the path that was asked for.
         pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
+        expected: cm that joints are expected to be off by in the mean, by a network that says so.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
     """
@@ -75,6 +76,7 @@ class GapReport:
     path: float | None = None
     pins: float | None = None
     drift: float | None = None
+    expected: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0
 
@@ -97,6 +99,8 @@ class GapReport:
             parts.append(f"feet slide {self.foot_slide:.1f} cm/s, travel {self.foot_travel:.2f} m")
         if self.drift is not None:
             parts.append(f"drift {self.drift:.1f} cm")
+        if self.expected is not None:
+            parts.append(f"expected to be off by {self.expected:.1f} cm")
         return "\n    ".join([f"gap {where}: " + "; ".join(parts), *self.notes])
 
 

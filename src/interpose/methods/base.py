@@ -22,8 +22,9 @@ from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import PARENTS, Mapping, find_mapping
+from interpose.skeletons import JOINTS, PARENTS, Mapping, find_mapping
 
+FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
 CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
 COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
 
@@ -77,7 +78,7 @@ class Base:
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         local = kinematics.local_rotations(turned, PARENTS)
         label = card.labels.index(self.action) if self.action else 0
-        said_local, said_root = run_long(
+        answer = run_long(
             card,
             sample_rotations(local, times),
             sample(root, times),
@@ -86,16 +87,36 @@ class Base:
             bones,
             pinned(observation, body.mapping, len(times), card.fps / clip.fps, body.scale),
         )
-        said = kinematics.global_rotations(said_local, PARENTS)
+        said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
         back = np.arange(len(clip))[missing] * card.fps / clip.fps
         # What is known of a frame is exactly so; only what is not is the network's.
         turns = rotations.normalize(sample_rotations_smooth(rotations.continuous(said), back))
         own = kinematics.local_rotations(turns, PARENTS)
         local[missing] = np.where(known[missing, : len(PARENTS), None], local[missing], own)
-        root[missing] = np.where(known[missing, -1:], root[missing], sample_smooth(said_root, back))
+        root[missing] = np.where(known[missing, -1:], root[missing], sample_smooth(answer.root, back))
         done = body.to_clip(kinematics.global_rotations(local, PARENTS), root / body.scale, base)
-        return Raw(done, notes={"model": card.name})
+        stands, expected = np.full((len(clip), len(FEET)), np.nan), np.full(len(clip), np.nan)
+        stands[missing] = sample(answer.stands, back)
+        expected[missing] = sample(answer.expected[:, None], back)[:, 0] / body.scale
+        return Raw(done, notes={"model": card.name}, stands=stands, expected=expected)
+
+
+@dataclass
+class Answer:
+    """What the network says of a motion at 30 fps.
+
+    Attributes:
+        local: (T, 22, 4) canonical rotations relative to the parent's; float64.
+        root: (T, 3) metres, the hips.
+        stands: (T, 4) how likely ankles and toes stand, 0 to 1.
+        expected: (T,) metres that joints are expected to be off.
+    """
+
+    local: np.ndarray
+    root: np.ndarray
+    stands: np.ndarray
+    expected: np.ndarray
 
 
 def small() -> Base:
@@ -149,7 +170,7 @@ def run(
     label: int,
     bones: np.ndarray,
     pins: tuple[np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Answer:
     """Run the graph on one motion at 30 fps.
 
     Args:
@@ -160,9 +181,6 @@ def run(
         label: index of the action.
         bones: (22, 3) metres.
         pins: (T, 22, 3) metres, where joints are to be, and (T, 22) of which joints that is said.
-
-    Returns:
-        The same rotations and hips, complete; float64.
     """
     # Far from the origin float32 would lose millimetres.
     origin = root[np.argmax(known[:, -1])] * [1.0, 0.0, 1.0]
@@ -176,8 +194,9 @@ def run(
         "label": np.array([label]),
         "bones": bones[None].astype(np.float32),
     }
-    turned, placed = weights.session(path).run(["local_out", "root_out"], feed)
-    return rotations.normalize(turned[0].astype(float)), placed[0].astype(float) + origin
+    names = ["local_out", "root_out", "contact", "error"]
+    turned, placed, stands, off = (out[0].astype(float) for out in weights.session(path).run(names, feed))
+    return Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
 
 
 def run_long(
@@ -188,13 +207,14 @@ def run_long(
     label: int,
     bones: np.ndarray,
     pins: tuple[np.ndarray, np.ndarray],
-) -> tuple[np.ndarray, np.ndarray]:
+) -> Answer:
     """Run the graph on a motion of any length, hole by hole; arguments and result as in `run`.
 
     A hole is seen with what is around it. Of one that is longer than the network can see, each window
     completes as much as half of it, which is taken as known from then on.
     """
     local, root, known = local.copy(), root.copy(), known.copy()
+    stands, expected = np.zeros((len(root), len(FEET))), np.zeros(len(root))
     for begin, end in runs(np.logical_not(known.all(axis=1))):
         while begin < end:
             short = end - begin <= card.max_gap
@@ -208,8 +228,9 @@ def run_long(
             inside = slice(begin, stop)
             own = slice(begin - first, stop - first)
             held = known[inside]
-            local[inside] = np.where(held[:, :-1, None], local[inside], said[0][own])
-            root[inside] = np.where(held[:, -1:], root[inside], said[1][own])
+            local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
+            root[inside] = np.where(held[:, -1:], root[inside], said.root[own])
+            stands[inside], expected[inside] = said.stands[own], said.expected[own]
             known[inside] = True
             begin = stop
-    return local, root
+    return Answer(local, root, stands, expected)
