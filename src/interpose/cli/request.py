@@ -278,5 +278,7 @@ def check_method(name: str) -> None:
     from interpose.methods import registry
 
     choices = list(dict.fromkeys(["auto", *registry.names()]))
-    if name not in choices:
+    if Path(name).is_dir():
+        registry.get(name)
+    elif name not in choices:
         raise unknown("method", name, choices)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from interpose.cli.console import say
+from interpose.cli.console import say, say_table
 from interpose.cli.reading import split_names
 from interpose.cli.research import needs_torch, shown
 from interpose.errors import FileError, RequestError, unknown
@@ -111,6 +111,72 @@ def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipp
     own = changed.config if name == "base" else name
     there = Path("weights") / own if shipped and not run.set else run.out / "weights"
     say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}")
+
+
+@train.default
+def own(
+    *,
+    data: Path,
+    from_: Annotated[str, Parameter(name="--from")] = "small",
+    out: Path = Path("own"),
+    budget: str = "10m",
+    set: list[str] = [],  # noqa: B006
+) -> None:
+    """Fine-tune interpose's own network on your own clips, and see what that brings on a part held out.
+
+    Reads all clips below a folder (.bvh, .amc, .npz) and holds out each fifth of them, or the last fifth of
+    each if they are few. Then `--method own` uses the new weights.
+
+    Try:
+      interpose train --from small --data my_takes/
+      interpose train --data my_takes/ --out weights_of_mine --budget 1h
+      interpose fill take.bvh --gap 120:160 --method weights_of_mine
+
+    Args:
+        data: the folder with your clips.
+        from_: the weights to begin with: small, or a folder.
+        out: the folder for the new weights; the run goes into a folder within it, and goes on if it is there.
+        budget: device time or steps: 10m, 1h, 2000steps.
+        set: change a setting of the recipe: name=value. May be repeated.
+    """
+    with needs_torch("train a network"):
+        from interpose.training.base import CONFIGS, JUDGED, BaseSettings, judge, train_base
+        from interpose.training.export import export_base
+    from interpose.datasets.own import own_pack
+    from interpose.methods import weights
+    from interpose.training.budget import Budget
+
+    begin = weights.card(from_)
+    if begin.method not in CONFIGS:
+        raise RequestError(
+            f"{from_} cannot be fine-tuned",
+            f"it belongs to {begin.method}; so far only interpose's own networks can",
+            "Write --from small.",
+        )
+    if (out / f"{begin.name}.onnx").exists():
+        raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
+    asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
+    # Gently: what it knows of all motion is to stay.
+    settings = change(BaseSettings(config=begin.method, learning_rate=2e-4, every_seconds=60.0), set)
+    pack = own_pack(data, JUDGED, say)
+    held = pack.splits == "validation"
+    minutes = [float(pack.seconds[part].sum()) / 60 for part in (~held, held)]
+    say(f"{len({*pack.names})} clips: {minutes[0]:.1f} min to learn from, {minutes[1]:.1f} min held out")
+    run = out / "run"
+    train_base([pack], run, asked, settings, start=begin, say=say)
+    export_base(run, [pack], out, ["train"], allowed)
+    before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))
+    say()
+    rows = [
+        (f"{gap} frames", *(f"{found[f'gap{gap}']:.2f}" for found in (before, after)))
+        for gap in (5, 15, 30, 45)
+    ]
+    say_table(("gap", "before", "after"), rows, right=("before", "after"))
+    say("mean error of joints in the part held out, cm on a body with a leg of 0.86 m")
+    if after["gap30"] >= before["gap30"]:
+        say("It is no better: more takes, or a smaller --set learning_rate=5e-5, may help.")
+    say()
+    say(f"wrote {out}: interpose fill TAKE.bvh --method {out}")
 
 
 @train.command

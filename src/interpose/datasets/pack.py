@@ -5,14 +5,14 @@ Test performers never enter a pack, so that no recipe can train on them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.datasets.catalogue import FPS, Entry, clips
+from interpose.datasets.catalogue import FPS, clips
 from interpose.errors import FileError
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
@@ -86,33 +86,54 @@ class Pack:
         return placed
 
 
+@dataclass(frozen=True)
+class Part:
+    """A clip on its way into a pack, at 30 fps, and what the pack says of it."""
+
+    clip: Clip
+    name: str
+    performer: str
+    label: str
+    split: str
+
+
 def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambda line: None) -> Pack:
     """Read all clips of a data set but the test performers', and pack them.
 
     Clips that are too short, or in which the body jumps, are told to `progress` and left out.
     """
-    chosen: list[tuple[Entry, Clip]] = []
+    chosen: list[Part] = []
     for entry in clips(dataset, data):
-        if entry.split == "test":
-            continue
-        clip = resample(entry.load(), FPS)
-        body = find_humanoid(clip)
-        if not body.mapping.usable:
-            progress(f"left out: {entry.name} (no humanoid: {', '.join(body.mapping.lacking)})")
-        elif len(clip) < 2 or np.abs(np.diff(body.root(clip) * body.scale, axis=0)).max() > JUMP:
-            progress(f"left out: {entry.name} (too short, or the body jumps)")
-        else:
-            chosen.append((entry, clip))
+        if entry.split != "test":
+            clip = resample(entry.load(), FPS)
+            if reason := unfit(clip):
+                progress(f"left out: {entry.name} ({reason})")
+            else:
+                chosen.append(Part(clip, entry.name, entry.performer, entry.label, entry.split))
+    return assemble(dataset, chosen)
+
+
+def unfit(clip: Clip) -> str | None:
+    """Why nothing can be learned from a clip at 30 fps, if so."""
+    body = find_humanoid(clip)
+    if not body.mapping.usable:
+        return f"no humanoid: {', '.join(body.mapping.lacking)}"
+    if len(clip) < 2 or np.abs(np.diff(body.root(clip) * body.scale, axis=0)).max() > JUMP:
+        return "too short, or the body jumps"
+    return None
+
+
+def assemble(dataset: str, chosen: Sequence[Part]) -> Pack:
+    """A pack of clips."""
     rests = dict(_rests(chosen))
     turned, roots = [np.zeros((0, len(JOINTS), 3), np.int16)], [np.zeros((0, 3), np.float32)]
     bones, bodies = [], []
-    for entry, clip in chosen:
-        body = find_humanoid(clip, rests[entry.performer])
-        turned.append(np.rint(rotations.log(body.rotations(clip)) / STEP).astype(np.int16))
-        roots.append((body.root(clip) * body.scale).astype(np.float32))
+    for part in chosen:
+        body = find_humanoid(part.clip, rests[part.performer])
+        turned.append(np.rint(rotations.log(body.rotations(part.clip)) / STEP).astype(np.int16))
+        roots.append((body.root(part.clip) * body.scale).astype(np.float32))
         bones.append(body.bones * body.scale)
         bodies.append(body.body)
-    lengths = [len(clip) for _, clip in chosen]
     shape = (len(chosen), len(JOINTS), 3)
     return Pack(
         dataset,
@@ -120,18 +141,15 @@ def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambd
         np.concatenate(roots),
         np.array(bones, np.float32).reshape(shape),
         np.array(bodies, np.float32).reshape(shape),
-        np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64),
-        np.array([entry.name for entry, _ in chosen]),
-        np.array([entry.performer for entry, _ in chosen]),
-        np.array([entry.label for entry, _ in chosen]),
-        np.array([entry.split for entry, _ in chosen]),
+        np.concatenate([[0], np.cumsum([len(part.clip) for part in chosen])]).astype(np.int64),
+        *(np.array([getattr(p, name) for p in chosen]) for name in ("name", "performer", "label", "split")),
     )
 
 
-def _rests(chosen: list[tuple[Entry, Clip]]) -> Iterator[tuple[str, Rest]]:
+def _rests(chosen: Sequence[Part]) -> Iterator[tuple[str, Rest]]:
     """The T-pose of each performer's skeleton, from a sample of all clips of that performer."""
-    for performer in {entry.performer for entry, _ in chosen}:
-        own = [clip for entry, clip in chosen if entry.performer == performer]
+    for performer in {part.performer for part in chosen}:
+        own = [part.clip for part in chosen if part.performer == performer]
         first, total = own[0], sum(map(len, own))
         alike = [clip for clip in own if clip.skeleton.names == first.skeleton.names]
         step = max(1, total // POOL)

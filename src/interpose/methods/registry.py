@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any, cast
 
 from interpose.errors import RequestError, unknown
+from interpose.methods import weights
 from interpose.methods.protocol import Actor, Method, Sampler
 
 # name: (module, class); the class is called without arguments.
@@ -36,7 +40,7 @@ def names() -> tuple[str, ...]:
 
 @cache
 def get(name: str) -> Method:
-    """The method of that name, always the same object.
+    """The method of that name, always the same object; of a folder with weights, the method that runs them.
 
     Raises RequestError for unknown names (with the list of known ones), and for a method of another package
     that cannot be loaded.
@@ -45,6 +49,12 @@ def get(name: str) -> Method:
         module, kind = METHODS[name]
         return getattr(import_module(module), kind)()
     offered = _offered()
+    if name not in offered and Path(name).is_dir():
+        # By the folder's name where a method can have one, so that a report can be repeated.
+        card = weights.card(name)
+        method: Any = get(card.method)
+        own = {"name": name} if "name" in {field.name for field in fields(method)} else {}
+        return cast("Method", replace(method, trained=card, **own))
     if name not in offered:
         raise unknown("method", name, names())
     entry = offered[name]

@@ -31,6 +31,7 @@ LOWER = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("U
 HANDS_FEET = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Hand", "Foot")]
 ENDS = [*HANDS_FEET, JOINTS.index("Head")]
 SHORTEST = 30  # frames; clips that are shorter are left out
+JUDGED = 10 + 45 + 1  # frames of a window that is validated: known ones, the longest gap, and one more
 # A foot stands that moves by less than this in a frame, in metres (.15 m a second).
 STANDS = 0.005
 # How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
@@ -275,7 +276,7 @@ def train_base(
     packs = chosen(packs, settings.datasets)
     labels = tuple(start.labels) if start else labels_of(packs, splits)
     poses = Poses(packs, splits, labels, SHORTEST, device)
-    held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, 10 + 45 + 1)
+    held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
     model = Base(settings.network(labels)).to(device)
     if start:
         restore(model, start.onnx)
@@ -322,6 +323,17 @@ def train_base(
     )
     return trainer.go(
         f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}", start
+    )
+
+
+def judge(card: Card, pack: Pack) -> dict[str, float]:
+    """What `validate` finds of trained weights on the clips of a pack that are held out."""
+    network = {**card.training["network"], "labels": tuple(card.labels)}
+    model = Base(BaseConfig(**network))
+    restore(model, card.onnx)
+    device = torch.device("cpu")
+    return validate(
+        model.eval(), Poses([pack], ("validation",), card.labels, SHORTEST, device).spread(128, JUDGED)
     )
 
 

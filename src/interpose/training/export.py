@@ -15,6 +15,7 @@ from onnx import TensorProto, helper, numpy_helper
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.datasets import DATASETS, Pack
+from interpose.datasets.own import NAME as OWN
 from interpose.errors import RequestError
 from interpose.methods.weights import Card
 from interpose.models.base import Base, BaseConfig
@@ -33,6 +34,7 @@ LICENCES = {
     "bandai": "CC BY-NC 4.0",
     "pfnn": "free for academic and non-commercial use",
     "cmu": "free for all uses, the data itself may not be resold; mocap.cs.cmu.edu",
+    OWN: "your own",
 }
 RESEARCH = "research and non-commercial use: the training data is licensed so"
 OPEN = "any use: trained on CMU data alone"
@@ -322,8 +324,13 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
     return card
 
 
-def export_base(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
-    """Write `base.onnx` or `small.onnx`, its card, the log and its curves into `out` from a run's folder."""
+def export_base(
+    folder: Path, packs: list[Pack], out: Path, splits: list[str], licence: str | None = None
+) -> Card:
+    """Write `base.onnx` or `small.onnx`, its card, the log and its curves into `out` from a run's folder.
+
+    licence: what the weights may be used for, where the packs do not decide.
+    """
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     network = settings.pop("network")
     name, labels = settings["config"], network["labels"]
@@ -341,7 +348,7 @@ def export_base(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         name=name,
         method=name,
         description="interpose's own network: whatever is missing of a motion",
-        licence=_licence(packs),
+        licence=licence or _licence(packs),
         data=_data(packs, splits),
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
@@ -382,7 +389,7 @@ def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
         frames = int(np.diff(pack.starts)[kept].sum())
         name = str(pack.dataset)
         data.append({"name": name, "licence": LICENCES[name], "clips": int(kept.sum()), "frames": frames})
-    return sorted(data, key=lambda one: list(DATASETS).index(one["name"]))
+    return sorted(data, key=lambda one: [*DATASETS, OWN].index(one["name"]))
 
 
 def _training(

@@ -96,11 +96,13 @@ class Opponent:
         model: the network.
         loss: from a random generator and the fraction of the budget spent to a scalar loss.
         optimizer: of its parameters; its learning rate follows the schedule of the run.
+        pace: its learning rate, as a multiple of the model's.
     """
 
     model: nn.Module
     loss: Callable[[np.random.Generator, float], Tensor]
     optimizer: torch.optim.Optimizer
+    pace: float = 1.0
 
 
 def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
@@ -236,15 +238,20 @@ class Trainer:
             kept["commit"] = commit()
             (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
         self.budget.start(gpu=self.device.type == "cuda")
-        told, losses = time.monotonic() - self.settings.every_seconds * 0.8, []
+        told = time.monotonic() - self.settings.every_seconds * 0.8
+        losses: list[Tensor] = []
+        against: list[Tensor] = []
         while self.budget.fraction < 1:
             opponents = [self.opponent] if self.opponent else []
-            for optimizer in (self.optimizer, *(one.optimizer for one in opponents)):
+            paces = [(self.optimizer, 1.0), *((one.optimizer, one.pace) for one in opponents)]
+            for optimizer, pace in paces:
                 for group in optimizer.param_groups:
-                    group["lr"] = self._rate()
+                    group["lr"] = pace * self._rate()
             for one in opponents:
                 one.optimizer.zero_grad(set_to_none=True)
-                one.loss(self.rng, self.budget.fraction).backward()
+                theirs = one.loss(self.rng, self.budget.fraction)
+                theirs.backward()
+                against.append(theirs.detach())
                 self._share(one.model)
                 one.optimizer.step()
             loss = self.loss(self.rng, self.budget.fraction)
@@ -266,8 +273,9 @@ class Trainer:
                     mean.copy_(now)
             due = time.monotonic() - told > self.settings.every_seconds or self.budget.fraction >= 1
             if due and rank() == 0:
-                self._tell(float(torch.stack(losses).mean()))
-                told, losses = time.monotonic(), []
+                said = {"loss": losses, **({"opponent": against} if against else {})}
+                self._tell({name: round(float(torch.stack(some).mean()), 5) for name, some in said.items()})
+                told, losses, against = time.monotonic(), [], []
         if dist.is_initialized():
             dist.barrier()
         return self.averaged
@@ -284,12 +292,12 @@ class Trainer:
                 self.board.add_scalar(name, value, int(entry["step"]))
         self.board.flush()
 
-    def _tell(self, loss: float) -> None:
-        entry = {
+    def _tell(self, losses: dict[str, float]) -> None:
+        entry: dict[str, float] = {
             "step": self.budget.spent_steps,
             "hours": round(self.budget.spent_seconds / 3600, 4),
             "fraction": round(self.budget.fraction, 4),
-            "loss": round(loss, 5),
+            **losses,
         }
         entry |= {name: round(value, 4) for name, value in self.validate(self.averaged).items()}
         with (self.folder / "log.jsonl").open("a") as log:

@@ -1,0 +1,69 @@
+"""A user's own clips as a pack, a part of them held out: what a network is fine-tuned on, and judged by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from interpose.clip import Clip
+from interpose.datasets.catalogue import FPS
+from interpose.datasets.pack import Pack, Part, assemble, unfit
+from interpose.errors import FileError, InterposeError
+from interpose.formats import FORMATS, load
+from interpose.geometry.time import resample
+
+NAME = "own"
+# Each fifth clip is held out; of fewer clips the last fifth of each.
+FIFTH = 5
+
+
+def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lambda line: None) -> Pack:
+    """Read all clips below a folder, in any format that can be read, and pack them.
+
+    Clips that cannot be read or used are told to `progress` and left out.
+
+    Args:
+        folder: where the clips are, also in folders within it.
+        shortest: frames at 30 fps that a held-out clip needs to be judged by.
+        progress: told what is left out.
+
+    Raises:
+        FileError: no clip can be used, or none is long enough to be held out.
+    """
+    found: list[tuple[str, Clip]] = []
+    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
+        name = str(path.relative_to(folder))
+        try:
+            clip = resample(load(path), FPS)
+        except InterposeError as error:
+            progress(f"left out: {name} ({error.what}: {error.why})")
+            continue
+        if reason := unfit(clip):
+            progress(f"left out: {name} ({reason})")
+        else:
+            found.append((name, clip))
+    if not found:
+        raise FileError(
+            f"no clips to learn from in {folder}",
+            f"none of its files ({', '.join(FORMATS)}) could be used",
+            "Name a folder of whole, clean takes.",
+        )
+    parts, performers = [], dict[tuple[object, ...], str]()
+    for number, (name, clip) in enumerate(found):
+        # Who has the same joints and bones is taken for one performer.
+        bones = (clip.skeleton.names, clip.skeleton.rest_translation.round(3).tobytes())
+        performer = performers.setdefault(bones, str(len(performers)))
+        cut = len(clip) - len(clip) // FIFTH
+        if len(found) < FIFTH:
+            pieces = [("train", clip.slice(0, cut)), ("validation", clip.slice(cut, len(clip)))]
+        else:
+            pieces = [("validation" if number % FIFTH == FIFTH - 1 else "train", clip)]
+        parts += [Part(piece, name, performer, "", split) for split, piece in pieces if len(piece) > 1]
+    held = [part for part in parts if part.split == "validation" and len(part.clip) >= shortest]
+    if not held:
+        raise FileError(
+            f"the clips in {folder} are too short",
+            f"a fifth of them is held out, and no part of it has {shortest} frames at {FPS:g} fps",
+            f"Add longer takes: {FIFTH * shortest / FPS:.0f} s in one clip are enough.",
+        )
+    return assemble(NAME, parts)

@@ -1,0 +1,81 @@
+"""Fine-tuning on a user's own clips, from their folder to a method that fills with the new weights."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("torch")
+
+from interpose.cli import main
+from interpose.datasets.own import own_pack
+from interpose.errors import FileError
+from interpose.formats import load, save
+
+
+@pytest.fixture
+def takes(data, tmp_path, monkeypatch):  # type: ignore[no-untyped-def]
+    """A folder with two takes and what else lies in such a folder."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "takes" / "day 1").mkdir(parents=True)
+    clip = load(data / "cmu_walk.bvh")
+    longer = np.r_[0 : len(clip), len(clip) - 2 : 0 : -1]  # to and fro
+    save(clip.with_motion(clip.rotation[longer], clip.translation[longer]), tmp_path / "takes" / "a.bvh")
+    shutil.copy(data / "cmu_run.bvh", tmp_path / "takes" / "day 1" / "run.bvh")
+    (tmp_path / "takes" / "notes.txt").write_text("not a clip")
+    (tmp_path / "takes" / "broken.bvh").write_text("HIERARCHY\n")
+    return tmp_path / "takes"
+
+
+def test_a_part_is_held_out_and_what_cannot_be_used_is_said(takes):
+    said: list[str] = []
+    pack = own_pack(takes, 56, said.append)
+    assert [line.split(" (")[0] for line in said] == ["left out: broken.bvh"]
+    frames = np.diff(pack.starts)
+    assert pack.splits.tolist() == ["train", "validation"] * 2
+    for whole in (frames[:2], frames[2:]):
+        assert whole[1] == whole.sum() // 5
+    # The same bones are one performer's.
+    assert pack.performers.tolist() == ["0", "0", "1", "1"]
+
+
+def test_of_many_takes_each_fifth_is_held_out(takes):
+    for number in range(5):
+        shutil.copy(takes / "a.bvh", takes / f"z{number}.bvh")
+    assert own_pack(takes, 56).splits.tolist() == ["train"] * 4 + ["validation"] + ["train"] * 2
+
+
+def test_takes_that_are_too_short_are_refused(takes):
+    (takes / "a.bvh").unlink()
+    with pytest.raises(FileError, match="too short"):
+        own_pack(takes, 56)
+    shutil.rmtree(takes / "day 1")
+    with pytest.raises(FileError, match="no clips to learn from"):
+        own_pack(takes, 56)
+
+
+def test_weights_of_ones_own_are_made_judged_and_used(takes, data, capsys):
+    words = ["--budget", "2steps", "--set", "batch=2", "--set", "longest=20"]
+    assert main(["train", "--from", "small", "--data", str(takes), "--out", "mine", *words]) == 0
+    told = capsys.readouterr().out
+    assert "before" in told
+    assert "30 frames" in told
+    card = json.loads(Path("mine/small.json").read_text())
+    assert card["data"][0]["name"] == "own"
+    assert "your own clips" in card["licence"]
+    assert card["training"]["earlier"][-1]["recipe"].startswith("interpose train base")
+    shutil.copy(data / "cmu_walk.bvh", "take.bvh")
+    assert main(["fill", "take.bvh", "--gap", "60:80", "--method", "mine"]) == 0
+    assert json.loads(Path("take.filled.json").read_text())["gaps"][0]["method"] == "mine"
+    assert main(["fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh"]) == 0
+    assert Path("again.bvh").read_text() == Path("take.filled.bvh").read_text()
+    capsys.readouterr()
+    assert main(["train", "--data", str(takes), "--out", "mine", *words]) == 2
+    assert "has weights already" in capsys.readouterr().err
+    assert main(["train", "--from", "cae", "--data", str(takes), "--out", "other"]) == 2
+    assert "cannot be fine-tuned" in capsys.readouterr().err
+    assert not Path("other").exists()
