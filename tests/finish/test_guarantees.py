@@ -195,6 +195,27 @@ def test_refused_gaps_are_filled_by_the_fallback(walk):
         complete(walk, known, Refusing(), fallback=Refusing())
 
 
+class Trembling(Linear):
+    """Jumps from frame to frame."""
+
+    name = "trembling"
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        raw = super().complete(clip, observation, seed)
+        turns = np.where(np.arange(len(clip)) % 2, 0.3, -0.3)[:, None]
+        rotation = rotations.multiply(raw.clip.rotation, rotations.about("X", turns))
+        return Raw(raw.clip.with_motion(rotation, raw.clip.translation))
+
+
+def test_the_rest_pose_is_no_better_than_motion_that_jumps(walk):
+    """Of joints that are never known the spline has only the rest pose; of others it has a motion."""
+    for frames, method in (((0, len(walk)), "trembling"), ((60, 90), "spline")):
+        seen = Observation.from_gaps(walk, [Gap(*frames, ("LeftUpLeg", "LeftLeg"))])
+        gap = complete(walk, seen, Trembling()).report.gaps[0]
+        assert gap.method == method
+        assert "the velocity jumps" in " ".join(gap.notes)
+
+
 def test_an_observation_of_another_clip_is_refused(walk):
     with pytest.raises(RequestError, match="does not fit"):
         complete(walk, gaps_of(walk.slice(0, 60), (10, 20)), Linear())

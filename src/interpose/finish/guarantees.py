@@ -185,9 +185,13 @@ def complete(
             _write(current, merged, span.start, (span.start, span.stop))
         settle(failed, second)
         for span in failed:
-            # Where the simpler method pops no less, there is no reason to lose the motion.
+            # Where the simpler method pops no less, there is no reason to lose the motion; nor where it has
+            # only the rest pose to say.
             excess, other = (_excess(clip, known, span, bounds)[0] for clip in (own, current))
-            if not span.hopeless and other > max(1.0, excess):
+            blank = isinstance(fallback, Spline) and any(
+                _never(known, gap, clip.skeleton.names) for gap in gaps if _of(spans, gap) is span
+            )
+            if not span.hopeless and (blank or other > max(1.0, excess)):
                 _write(current, own, span.start, (span.start, span.stop))
                 continue
             span.method = fallback.name
