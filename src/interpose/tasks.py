@@ -97,7 +97,8 @@ def fill(
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, parts)
     pinning.check(clip, observation)
-    brief = _momentary(clip, observation) if isinstance(gaps, Observation) else None
+    momentary = isinstance(gaps, Observation) and not observation.pins
+    brief = _momentary(clip, observation) if momentary else None
     if brief and method in ("auto", "spline"):
         mended, seen = _mended(clip, observation, brief)
         rest = fill(

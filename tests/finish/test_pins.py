@@ -115,12 +115,54 @@ def test_a_forecast_may_end_at_a_pin(cmu_walk):
         (Pin("LeftHand", np.array([80]), np.zeros((2, 3))), "does not fit"),
         (Pin("LeftHand", np.array([80]), np.full((1, 3), np.nan)), "does not fit"),
         (Pin("LeftHand", np.array([80])), "says nothing"),
+        (Pin("LeftHand", np.array([80.5]), np.zeros((1, 3))), "whole numbers"),
+        (Pin("LeftHand", np.array([], int), np.zeros((0, 3))), "one or more"),
+        (Pin("LeftHand", np.array([80]), np.zeros((1, 3)), tolerance=0.0), "above zero"),
+        (Pin("LeftHand", np.array([80]), None, np.zeros((1, 4))), "is zero"),
         (Pin("Nose", np.array([80]), np.zeros((1, 3))), "unknown joint"),
     ],
 )
 def test_pins_that_make_no_sense_are_refused(cmu_walk, pin, why):
     with pytest.raises(RequestError, match=why):
         tasks.fill(cmu_walk, [GAP], "spline", pins=[pin])
+
+
+def test_several_pins_of_a_joint_count_as_one(cmu_walk):
+    one, two = lifted(cmu_walk, 80), lifted(cmu_walk, 90)
+    both = Pin("LeftHand", np.array([80, 90]), np.concatenate([one.position, two.position]))
+    done = [
+        tasks.fill(cmu_walk, [GAP], "spline", pins=some) for some in ([one, two], [both], [one, one, two])
+    ]
+    assert all(gap.pins < 0.1 for fill in done for gap in fill.report.gaps)
+    for fill in done[1:]:
+        np.testing.assert_allclose(fill.clip.positions(), done[0].clip.positions(), atol=1e-6)
+
+
+def test_what_a_pin_tears_is_measured_and_said(cmu_walk):
+    """Right beside a seam there is no time to come: the pin is met, and the report says that it jumps."""
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[lifted(cmu_walk, 70)])
+    gap = done.report.gaps[0]
+    jump = np.linalg.norm(np.diff(done.clip.positions()[68:71], n=2, axis=0), axis=-1).max()
+    assert gap.pins < 0.1
+    assert gap.seam_after == pytest.approx(100 * jump, rel=0.01)
+    assert "flagged: the velocity jumps" in " ".join(gap.notes)
+
+
+def test_a_pin_in_the_next_street_is_asked_about(cmu_walk):
+    gap = tasks.fill(cmu_walk, [GAP], "spline", pins=[lifted(cmu_walk, up=(0, 0, 30))]).report.gaps[0]
+    assert "is the unit right?" in " ".join(gap.notes)
+
+
+def test_a_path_and_a_pin_are_both_reported(cmu_walk):
+    path = {85: cmu_walk.root[85, [0, 2]] + [0.1, 0.0]}
+    gap = tasks.fill(cmu_walk, [GAP], "spline", path=path, pins=[lifted(cmu_walk)]).report.gaps[0]
+    assert gap.pins < 0.1
+    assert gap.path is not None
+
+
+def test_what_a_network_expects_is_kept(cmu_walk):
+    gap = tasks.fill(cmu_walk, [GAP], "small", pins=[lifted(cmu_walk)]).report.gaps[0]
+    assert gap.expected is not None
 
 
 def test_pins_are_cut_with_their_observation(cmu_walk):

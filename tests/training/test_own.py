@@ -49,6 +49,16 @@ def test_of_many_takes_each_fifth_is_held_out(takes):
     assert own_pack(takes, 56).splits.tolist() == ["train"] * 4 + ["validation"] + ["train"] * 2
 
 
+def test_what_interpose_made_is_no_take(takes):
+    shutil.copy(takes / "a.bvh", takes / "a.filled.bvh")
+    (takes / "a.filled.json").write_text("{}")
+    said: list[str] = []
+    assert "a.filled.bvh" not in own_pack(takes, 56, said.append).names
+    assert any("interpose made it" in line for line in said)
+    with pytest.raises(FileError, match="there is no folder"):
+        own_pack(takes / "none", 56)
+
+
 def test_takes_that_are_too_short_are_refused(takes):
     (takes / "a.bvh").unlink()
     with pytest.raises(FileError, match="too short"):
@@ -76,6 +86,10 @@ def test_weights_of_ones_own_are_made_judged_and_used(takes, data, capsys):
     capsys.readouterr()
     assert main(["train", "--data", str(takes), "--out", "mine", *words]) == 2
     assert "has weights already" in capsys.readouterr().err
+    Path("mine/small.onnx").unlink()
+    (takes / "a.bvh").rename(takes / "b.bvh")
+    assert main(["train", "--data", str(takes), "--out", "mine", *words]) == 2
+    assert "cannot go on" in capsys.readouterr().err
     assert main(["train", "--from", "cae", "--data", str(takes), "--out", "other"]) == 2
     assert "cannot be fine-tuned" in capsys.readouterr().err
     assert not Path("other").exists()

@@ -29,7 +29,8 @@ def screen(**options: Any) -> Console:
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return Screen(**options)
+    # Frames such as 70:100: are no names of little pictures.
+    return Screen(emoji=False, **options)
 
 
 def console(stderr: bool = False) -> Console:

@@ -195,7 +195,7 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
                 "Write for example --pin LeftHand@130:35,142,-20, or LeftHand@130:140:35,142,-20 to hold it.",
             )
         clip.skeleton.index(match[1])
-        frames = np.arange(start, stop)
+        frames = np.arange(start, min(stop, len(clip) + start + 1))  # `check` says what is outside
         found.append(Pin(match[1], frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
     return found
 
@@ -278,7 +278,9 @@ def check_method(name: str) -> None:
     from interpose.methods import registry
 
     choices = list(dict.fromkeys(["auto", *registry.names()]))
+    if name in choices:
+        return
     if Path(name).is_dir():
         registry.get(name)
-    elif name not in choices:
+    else:
         raise unknown("method", name, choices)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -163,6 +164,16 @@ def own(
     minutes = [float(pack.seconds[part].sum()) / 60 for part in (~held, held)]
     say(f"{len({*pack.names})} clips: {minutes[0]:.1f} min to learn from, {minutes[1]:.1f} min held out")
     run = out / "run"
+    takes = {
+        "start": begin.training.get("steps"),
+        "clips": pack.names.tolist(),
+        "splits": pack.splits.tolist(),
+    }
+    if (run / "checkpoint.pt").exists() and json.loads((run / "takes.json").read_text()) != takes:
+        why = "its clips or the weights that it began with are others now"
+        raise RequestError(f"the run in {run} cannot go on", why, "Name another --out.")
+    run.mkdir(parents=True, exist_ok=True)
+    (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
     export_base(run, [pack], out, ["train"], allowed)
     before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))

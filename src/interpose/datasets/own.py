@@ -31,8 +31,15 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
         FileError: no clip can be used, or none is long enough to be held out.
     """
     found: list[tuple[str, Clip]] = []
+    if not folder.is_dir():
+        raise FileError(
+            f"there is no folder {folder}", "clips are looked for in a folder", "Name it with --data."
+        )
     for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
         name = str(path.relative_to(folder))
+        if path.with_suffix(".json").exists():
+            progress(f"left out: {name} (interpose made it: its report lies beside it)")
+            continue
         try:
             clip = resample(load(path), FPS)
         except InterposeError as error:

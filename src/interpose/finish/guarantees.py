@@ -40,6 +40,8 @@ DOUBT = 0.15
 BESIDE, SHARE = 0.25, 1 / 6
 # A share of all joints: so many laid on a body are most of it.
 MOST = 0.5
+# Metres from where it would be at which a pinned joint is asked about.
+FAR = 1.5
 # A path on which the root goes this much further than without it is said to be too long.
 FURTHER = 1.5
 # Frames solved at once.
@@ -196,6 +198,8 @@ def complete(
                 continue
             span.method = fallback.name
             span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
+    if isinstance(method, Layer) and method.pins:
+        current = pins.meet(current, known, method.pins)
     for span in spans:
         if above := _pop(current, known, span, bounds):
             span.notes.append(f"flagged: {above}")
@@ -300,16 +304,15 @@ def _pinned(
 ) -> Completion:
     """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
     pins.check(clip, observation)
-    asked, free = observation.pins, replace(observation, pins=())
+    asked, free = pins.merged(observation.pins), replace(observation, pins=())
     told = _Told(method.name, method, asked)
     body = complete(clip, free, told, seed, fallback, limit, path, first)
     known = _trusted(clip, free)
     met = pins.meet(body.clip, known, asked)
-    layer = Layer(method.name, met, body.raw, np.zeros_like(known.rotation))
+    layer = Layer(method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
     done = _told_of(body, complete(clip, free, layer, seed, layer, limit, first=first))
-    # Seams may have been softened beside a pin, which comes first.
-    done = replace(done, clip=pins.meet(done.clip, known, asked))
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
+    away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(body.clip, asked)}
 
     def judged(gap: GapReport) -> GapReport:
         inside = [one for one in off if gap.start <= one[1] < gap.stop]
@@ -320,8 +323,22 @@ def _pinned(
         if worst[2] > 100 * worst[0].tolerance:
             notes.append(
                 f"flagged: {worst[0].joint} misses its pin at frame {first + worst[1]} by {worst[2]:.1f} cm: "
-                "it is out of reach"
+                "it is out of reach, or pins contradict each other"
             )
+        far, where = max((away[pin.joint, frame], (pin.joint, first + frame)) for pin, frame, _ in inside)
+        if far > FAR:
+            notes.append(
+                f"flagged: {where[0]} is pinned {far:.1f} m from where it would be at frame {where[1]}: "
+                "is the unit right?"
+            )
+        points = [
+            np.linalg.norm(done.clip.root[f, [0, 2]] - p)
+            for f, p in (path or {}).items()
+            if gap.start <= f < gap.stop
+        ]
+        if points:
+            notes.append(f"the path is met within {100 * max(points):.1f} cm")
+            gap = replace(gap, path=100 * float(max(points)))
         return replace(gap, pins=max(distance for *_, distance in inside), notes=(*gap.notes, *notes))
 
     reports = [judged(gap) for gap in done.report.gaps]
@@ -581,7 +598,9 @@ def _report(
     scant = _scant(known, gap, finished.fps) if networks else None
     never = [] if own and "model" in raw.notes else _never(known, gap, skeleton.names)
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
-    risk = raw.expected[gap.start : gap.stop] if own and raw.expected is not None else None
+    # It speaks of all joints: where most of them are known it would mislead.
+    whole = gap.joints is None and own and raw.expected is not None
+    risk = raw.expected[gap.start : gap.stop] if whole and raw.expected is not None else None
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,

@@ -15,7 +15,7 @@ from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Pin
 
 
 def loose(clip: Clip, observation: Observation) -> np.ndarray:
@@ -37,7 +37,8 @@ def without(observation: Observation, some: np.ndarray) -> Observation:
 class Layer:
     """A finished completion of the body as a method, with the loose joints (F, J) laid on it.
 
-    `stands`: its feet have been held already, and it has not been moved since.
+    `stands`: its feet have been held already, and it has not been moved since. `pins` are met once more when
+    its seams have been eased.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Layer:
     raw: Raw
     joints: np.ndarray
     stands: bool = True
+    pins: tuple[Pin, ...] = ()
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Never: the body is there already."""
@@ -60,4 +62,5 @@ class Layer:
             clip.with_motion(off, np.zeros_like(clip.translation)), Observation(known, np.ones_like(known))
         )
         rotation = rotations.multiply(self.body.rotation, change.clip.rotation)
-        return Raw(self.body.with_motion(rotation, self.body.translation), notes=self.raw.notes)
+        own = self.body.with_motion(rotation, self.body.translation)
+        return Raw(own, notes=self.raw.notes, stands=self.raw.stands, expected=self.raw.expected)

@@ -6,7 +6,7 @@ around it, and all joints that are free share it, feet and the other pins last.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 
 import numpy as np
@@ -37,6 +37,13 @@ def check(clip: Clip, observation: Observation) -> None:
     turned = _turned(clip.skeleton, observation)
     for pin in observation.pins:
         joint, frames = clip.skeleton.index(pin.joint), np.asarray(pin.frames)
+        if frames.ndim != 1 or frames.size == 0 or frames.dtype.kind not in "iu":
+            raise RequestError(
+                f"the pin of {pin.joint} does not fit",
+                "its frames must be a list of whole numbers, one or more",
+            )
+        if not pin.tolerance > 0:
+            raise RequestError(f"the pin of {pin.joint} does not fit", "its tolerance must be above zero")
         if pin.position is None and pin.orientation is None:
             raise RequestError(
                 f"the pin of {pin.joint} says nothing", "it has neither a position nor an orientation"
@@ -55,6 +62,8 @@ def check(clip: Clip, observation: Observation) -> None:
                 f"there is no frame {frames[outside][0]} for the pin of {pin.joint}",
                 f"the clip has {len(clip)} frames, counted from 0",
             )
+        if pin.orientation is not None and np.linalg.norm(pin.orientation, axis=1).min() < 1e-6:
+            raise RequestError(f"the pin of {pin.joint} does not fit", "a quaternion of it is zero")
         known = (pin.position is not None) & placed[frames, joint]
         known |= (pin.orientation is not None) & turned[frames, joint]
         if known.any():
@@ -65,13 +74,33 @@ def check(clip: Clip, observation: Observation) -> None:
             )
 
 
+def merged(pins: Iterable[Pin]) -> tuple[Pin, ...]:
+    """A pin of places, and one of orientations, for each joint; of a frame that is pinned twice the last."""
+    found: dict[tuple[str, str], tuple[dict[int, np.ndarray], float]] = {}
+    for pin in pins:
+        for kind in ("position", "orientation"):
+            if (values := getattr(pin, kind)) is not None:
+                rows, tolerance = found.get((pin.joint, kind), ({}, np.inf))
+                rows |= {int(frame): np.asarray(value) for frame, value in zip(pin.frames, values)}
+                found[pin.joint, kind] = (rows, min(tolerance, pin.tolerance))
+    return tuple(
+        Pin(
+            joint,
+            np.array(sorted(rows)),
+            tolerance=least,
+            **{kind: np.array([rows[f] for f in sorted(rows)])},
+        )
+        for (joint, kind), (rows, least) in found.items()
+    )
+
+
 def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
     """The clip with its pins met, as far as its bones reach.
 
     Args:
         clip: (F) complete.
         known: what may not be changed.
-        pins: as `check` lets them pass.
+        pins: as `check` lets them pass, `merged`.
     """
     for start, stop in runs(~known.frames):
         # The frames beside a gap are its edges: nothing of them can change.

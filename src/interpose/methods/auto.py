@@ -8,23 +8,21 @@ from interpose.methods import registry, weights
 from interpose.methods.protocol import Method
 from interpose.observation import Gap
 
-# Frames at 30 fps from which `cmib` is better than the others, by how many sides of the gap are lone keys. On
-# the validation performer its L2P between two is .85, .71 and .68 of interpolation's at 7, 40 and 60 frames,
-# the spline's 1.10, 1.01 and 1.02, and that of `cae` 1.01, 1.01 and .99 (bench lafan1 --protocol cmib). With
-# motion before the gap and a lone key after it .64, .69 and .72 at 5, 15 and 30; the spline's .61, .77, .83.
-LONE = {1: 10, 2: 1}
-# Networks for gaps of the whole pose amid motion, and for joints that are missing on their own, the best one
-# first. On validation performers (bench every --most 8) joints are off by 10.2, 15.1 and 14.9 cm where one
-# joint, three or a limb are lost with `small`, 17.8, 32.5 and 16.5 with `cae`, although that one has seen
-# these performers; gaps of 1 and 2 s by 5.8 and 10.0 with `small`, 4.7 and 6.8 with `cae`.
-AMID, JOINTS = ("cae", "small"), ("small", "cae")
+# Networks for gaps of the whole pose, for joints missing on their own, and between two lone keys, the
+# best one first; measured on validation performers. Amid motion joints are off by 1.8, 4.1 and 8.3 cm with
+# `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on these
+# performers, 2.4, 6.4, 11.4 with the spline (bench threshold). Before a lone key 5.0 with `small`, 6.0 with
+# `cmib` in a gap of a second; between two of them 6.1 and 6.3, with one more in the middle of two seconds 6.5
+# and 6.1. Where one joint, three or a limb are lost 7.9, 10.0 and 15.7 with `small`, 17.8, 32.5 and 16.5 with
+# `cae` (bench every).
+AMID, JOINTS, KEYS = ("small", "cae"), ("small", "cae"), ("cmib",)
 
 
 def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
     """The method that measured best on validation performers for gaps of this length.
 
     A network from its length on, unless it refuses: then the next best one; joints that are missing on
-    their own go to networks as well. Where `lone` sides (1 or 2) are single keys little tells how fast
+    their own go to networks as well. Where both sides (`lone` is 2) are single keys nothing tells how fast
     anything moves: there the network that was made for keys is better. The spline else, and where no weights
     are installed; then with the reason why no network fills a gap that would be its own.
     """
@@ -36,7 +34,7 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
             why = why or f"{error.what}: {error.fix}"
             continue
         network = registry.get(name)
-        least = LONE[lone] if name == "cmib" else 0 if gap.joints is not None else card.auto["from_gap"]
+        least = 0 if gap.joints is not None or name in KEYS else card.auto["from_gap"]
         if len(gap) * card.fps / clip.fps < least:
             continue
         reason = network.refuses(clip, gap)
@@ -50,4 +48,4 @@ def _candidates(gap: Gap, lone: int) -> tuple[str, ...]:
     """The networks for a gap, the best one first."""
     if gap.joints is not None:
         return JOINTS
-    return ("cmib",) if lone else AMID
+    return KEYS if lone == 2 else AMID

@@ -224,7 +224,7 @@ def run_long(
             said = run(
                 card.onnx, local[part], root[part], known[part], label, bones, (pins[0][part], pins[1][part])
             )
-            stop = end if short else begin + card.max_gap // 2
+            stop = end if short else begin + max(card.max_gap // 2, 1)
             inside = slice(begin, stop)
             own = slice(begin - first, stop - first)
             held = known[inside]

@@ -50,7 +50,7 @@ def get(name: str) -> Method:
         return getattr(import_module(module), kind)()
     offered = _offered()
     if name not in offered and Path(name).is_dir():
-        # By the folder's name where a method can have one, so that a report can be repeated.
+        # By the folder's name where a method can have one: only then can its report be repeated.
         card = weights.card(name)
         method: Any = get(card.method)
         own = {"name": name} if "name" in {field.name for field in fields(method)} else {}
