@@ -96,7 +96,6 @@ def fill(
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, parts)
-    pinning.check(clip, observation)
     momentary = isinstance(gaps, Observation) and not observation.pins
     brief = _momentary(clip, observation) if momentary else None
     if brief and method in ("auto", "spline"):
@@ -494,7 +493,8 @@ def plan(
     action: str = "",
     temperature: float = 1.0,
 ) -> list[Job]:
-    """The runs of incomplete frames, numbered in order of time, each with its method."""
+    """The runs of incomplete frames, numbered in order of time, each with its method; pins are checked."""
+    pinning.check(clip, observation)
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
     for number in (*(only or ()), *methods):
         if not 1 <= number <= len(spans):

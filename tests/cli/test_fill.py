@@ -415,6 +415,13 @@ def test_a_pin_that_cannot_be_read(run, take, text):
     assert f"cannot read --pin {text}" in done.err
 
 
+def test_a_dry_run_checks_pins(run, take):
+    words = ["fill", "take.bvh", "--gap", "60:90", "--dry-run", "--pin"]
+    assert "cannot be pinned at frame 20" in run(*words, "LeftHand@20:1,2,3").err
+    assert "no frame 9000" in run(*words, "LeftHand@9000:9000000000:1,2,3").err
+    assert run(*words, "LeftHand@70:1,2,3").code == 0
+
+
 @pytest.mark.parametrize("text", ["75", "75:1", "75:1,nan", "75:1,2,3", "a:1,2", "75:1,"])
 def test_a_path_that_cannot_be_read(run, take, text):
     done = run("fill", "take.bvh", "--gap", "60:90", "--path", text)

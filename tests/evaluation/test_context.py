@@ -26,8 +26,8 @@ def test_both_studies_on_a_walk(published, tmp_path):
     result = context.run(published, most=1)
     assert result.labels == ["lafan1 run"], "as its file is called"
     assert result.mean("cae", 10) < result.mean("cae", 40), "longer gaps are harder"
-    assert result.mean("auto", 10) == result.mean("spline", 10), "too short for the network"
-    assert result.mean("auto", 40) == result.mean("cae", 40) < result.mean("linear", 40)
+    for gap in (10, 40):
+        assert result.mean("auto", gap) < result.mean("linear", gap)
     alone, _, most = result.curve("", "cae")
     assert most < 0.5 * alone, "single poses do not tell a walk"
     assert result.alive("truth", 40) == (1.0, 0.0)
@@ -59,8 +59,8 @@ def test_methods_see_the_context_and_the_truth_scores_zero(published, monkeypatc
 def test_a_single_frame_beside_a_gap_is_a_key(published):
     (window,) = windows(published, ("lafan1",), "validation", most=1)
     assert context._method("auto", window, Gap(1, 41)).name == "cmib"
-    assert context._method("auto", window, Gap(5, 45)).name == "cae"
-    assert context._method("auto", window, Gap(5, 15)).name == "spline"
+    assert context._method("auto", window, Gap(5, 45)).name == "small"
+    assert context._method("auto", window, Gap(5, 14)).name == "spline"
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from interpose.errors import RequestError
 if TYPE_CHECKING:
     from interpose.cli.request import Request
     from interpose.clip import Clip
-    from interpose.observation import Gap
+    from interpose.observation import Gap, Pin
 
 
 def fill(
@@ -110,7 +110,7 @@ def fill(
         raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
     outputs = Outputs.choose(file, output, "filled", player)
     if dry_run:
-        return _dry_run(file, clip, request, max_gap, outputs, json, force, gaps)
+        return _dry_run(file, clip, request, pins, max_gap, outputs, json, force, gaps)
     outputs.check(file, force, gaps)
     missing = sum(map(len, request.gaps))
     with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
@@ -148,6 +148,7 @@ def _dry_run(
     file: Path,
     clip: Clip,
     request: Request,
+    pins: list[Pin],
     max_gap: int | None,
     outputs: Outputs,
     as_json: bool,
@@ -160,6 +161,7 @@ def _dry_run(
     from interpose.observation.part import lay
 
     clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), [part for _, part in request.parts])
+    seen = replace(seen, pins=tuple(pins))
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
     left = any(job.method is None for job in jobs)
     if as_json:
