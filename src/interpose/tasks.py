@@ -514,6 +514,12 @@ def plan(
             chosen, note = auto.choose(clip, lead, _lone(observation, gap))
         else:
             chosen = registry.told(name, action, temperature)
+        if open_ and (pins := observation.slice(gap.start, gap.stop).pins):
+            raise RequestError(
+                f"{pins[0].joint} is pinned in a gap that stays open: frame {gap.start + pins[0].frames[0]}",
+                f"gap {number}, {gap}, is longer than allowed, or not among the gaps chosen",
+                "Leave the pin out, or let the gap be filled.",
+            )
         jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
 

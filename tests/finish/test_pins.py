@@ -165,6 +165,14 @@ def test_what_a_network_expects_is_kept(cmu_walk):
     assert gap.expected is not None
 
 
+def test_what_would_not_be_met_is_refused(cmu_walk):
+    turned = Pin("LeftHand", np.array([85]), None, rotations.about("Y", np.array([0.8])))
+    with pytest.raises(RequestError, match="how it is turned"):
+        tasks.fill(cmu_walk, [Gap(70, 100, ("LeftArm",))], "spline", pins=[turned])
+    with pytest.raises(RequestError, match="stays open"):
+        tasks.fill(cmu_walk, [GAP, Gap(120, 190)], "spline", max_gap=40, pins=[lifted(cmu_walk, 150)])
+
+
 def test_pins_are_cut_with_their_observation(cmu_walk):
     seen = replace(Observation.from_gaps(cmu_walk, [GAP]), pins=(lifted(cmu_walk),))
     (pin,) = seen.slice(80, 120).pins

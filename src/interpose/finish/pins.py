@@ -65,11 +65,12 @@ def check(clip: Clip, observation: Observation) -> None:
         if pin.orientation is not None and np.linalg.norm(pin.orientation, axis=1).min() < 1e-6:
             raise RequestError(f"the pin of {pin.joint} does not fit", "a quaternion of it is zero")
         known = (pin.position is not None) & placed[frames, joint]
-        known |= (pin.orientation is not None) & turned[frames, joint]
+        # It is the joint itself that turns.
+        known |= (pin.orientation is not None) & (turned | observation.rotation)[frames, joint]
         if known.any():
             raise RequestError(
                 f"{pin.joint} cannot be pinned at frame {frames[known][0]}",
-                "where it is there follows from what is observed, which comes back unchanged",
+                "where it is, or how it is turned, follows from what is observed, which comes back unchanged",
                 "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
             )
 
