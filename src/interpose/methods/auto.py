@@ -13,7 +13,7 @@ from interpose.observation import Gap
 # `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on these
 # performers, 2.4, 6.4, 11.4 with the spline (bench threshold). Before a lone key 5.0 with `small`, 6.0 with
 # `cmib` in a gap of a second; between two of them 6.1 and 6.3, with one more in the middle of two seconds 6.5
-# and 6.1. Where one joint, three or a limb are lost 7.9, 10.0 and 15.7 with `small`, 17.8, 32.5 and 16.5 with
+# and 6.1. Where one joint, three or a limb are lost 7.1, 9.3 and 13.8 with `small`, 8.8, 13.9 and 16.5 with
 # `cae` (bench every).
 AMID, JOINTS, KEYS = ("small", "cae"), ("small", "cae"), ("cmib",)
 
