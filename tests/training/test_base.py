@@ -195,7 +195,6 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
     said = method.run(card.onnx, local, root, known == 1, int(given[5][0]), bones, (pinned, pins))
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
-    assert np.allclose(said.stands, expected[2][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
 
 

@@ -7,13 +7,13 @@ from typing import Any
 from interpose.cli.console import say, say_json, say_table
 
 METHODS = {
-    "auto": "what measured best: short gaps the spline, long ones cae, lone keys cmib, joints small",
+    "auto": "what measured best: short gaps the spline, all else small, between lone keys cmib",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "kalman": "low-rank Kalman smoothing: joints that move together tell where a lost limb is",
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
     "cmib": "conditional in-betweening of Kim et al. 2022: between keys, with an action if you like",
-    "small": "interpose's own network: any part of a pose is enough; best for lost joints and limbs",
+    "small": "interpose's own network: gaps, lost joints and limbs, pins; any part of a pose is enough",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",
 }
 
