@@ -25,6 +25,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
 LOWER = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Toe")]
@@ -61,8 +62,10 @@ class BaseSettings(Settings):
     tasks: str = "all"  # one of TASKS
     datasets: str = ""  # names separated by commas; all packs without any
     batch: int = 64  # of all processes together
-    warm_up: float = 0.03
+    learning_rate: float = 3e-3
+    warm_up: float = 0.05
     decay: float = 0.01
+    muon: int = 1  # whether Muon moves the matrices of the blocks; else AdamW moves all
     shortest: int = 1  # frames of a gap
     longest: int = 120
     short: float = 1.0  # gaps are drawn as often as their length to minus this: 0 for uniformly
@@ -82,9 +85,9 @@ class BaseSettings(Settings):
     layers: int = 0
     # Weights of the losses.
     position: float = 10.0  # of metres, in the mean over what is missing
-    rotation: float = 5.0  # of matrix entries
+    rotation: float = 10.0  # of matrix entries
     velocity: float = 10.0  # of metres a frame
-    contact: float = 0.02
+    contact: float = 0.2
     slide: float = 5.0  # of metres a frame that a standing foot moves
     risk: float = 0.02
 
@@ -248,6 +251,12 @@ class Losses:
         return torch.stack([getattr(self.settings, name) * part for name, part in parts.items()]).sum()
 
 
+def title(config: str, datasets: str) -> str:
+    """What weights are called: the configuration, and what they were trained on, if not on all; "open" if on
+    what may be used for anything."""
+    return "-".join([config, *({"cmu": "open"}.get(name, name) for name in datasets.split(",") if name)])
+
+
 def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:
     """The packs that are asked for. RequestError for one that is not there."""
     if not names:
@@ -304,7 +313,10 @@ def train_base(
         given = spoil(truth, noisy, settings.noise, int(rng.integers(2**31)))
         return wrong(given, truth, drawn.positions(), known, pins, drawn.label, drawn.bones)
 
-    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
+    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
+        if settings.muon:
+            named = list(model.named_parameters())
+            return Muon(named, "encoder.blocks.", settings.learning_rate, settings.decay)
         return torch.optim.AdamW(
             parameters, settings.learning_rate, (0.9, 0.99), weight_decay=settings.decay, fused=True
         )

@@ -23,6 +23,7 @@ from torch import distributed as dist
 from interpose.errors import FileError
 from interpose.methods.weights import Card
 from interpose.training.budget import Budget
+from interpose.training.optimizers import Muon
 
 
 def pick_device() -> torch.device:
@@ -133,7 +134,7 @@ class Trainer:
         budget: Budget,
         settings: Settings,
         say: Callable[[str], None] = print,
-        optimizer: Callable[[list[nn.Parameter]], torch.optim.Optimizer] | None = None,
+        optimizer: Callable[[list[nn.Parameter]], torch.optim.Optimizer | Muon] | None = None,
         clip: float | None = None,
         about: dict[str, Any] | None = None,
         opponent: Opponent | None = None,
@@ -141,7 +142,9 @@ class Trainer:
         self.model, self.loss, self.validate = model, loss, validate
         self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
         self.device = next(model.parameters()).device
-        make = optimizer or (lambda some: torch.optim.Adam(some, settings.learning_rate))
+        make: Callable[[list[nn.Parameter]], torch.optim.Optimizer | Muon] = optimizer or (
+            lambda some: torch.optim.Adam(some, settings.learning_rate)
+        )
         self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
         self.opponent = opponent
         self.board: Any = None  # TensorBoard's, where it is installed
