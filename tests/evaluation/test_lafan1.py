@@ -87,6 +87,11 @@ def test_the_truth_itself_scores_zero(published, protocol, monkeypatch):
     row = lafan1.measure(held, rules, windows, 30, registry.get("spline"), False)
     assert len(clips[0]) == 41 if protocol == "official" else 30
     assert max(row.l2p, row.l2q, row.npss) < 1e-9
+    # Finished it is seen as the motion was, which the benchmark tells beside.
+    row = lafan1.measure(held, rules, windows, 30, registry.get("spline"), True)
+    assert str(row.seen) == str(lafan1.as_it_was(held, rules, windows, 30))
+    assert row.seen.travel > 0
+    assert row.fell_back == 0
 
 
 @pytest.mark.parametrize("protocol", list(PROTOCOLS))
@@ -133,9 +138,10 @@ def test_the_whole_benchmark(published):
     assert list(result.rows) == ["zero-velocity", "linear", "spline", "spline, finished"]
     assert result.ratio("linear", 5, "l2p") == 1
     assert result.ratio("zero-velocity", 15, "l2p") > 1 > result.ratio("spline", 15, "l2p")
-    assert result.rows["spline, finished"][15].bones < 1e-6
+    assert result.rows["spline, finished"][15].seen.bones < 1e-6
     assert result.to_dict()["rows"]["linear"]["5"]["ratios"]["l2q"] == 1
     assert "| zero-velocity |" in str(result)
+    assert f"| truth | {result.truth[5]} |" in str(result)
     assert result.plot().startswith("<svg")
 
 

@@ -35,6 +35,7 @@ STATISTICS_WINDOW, STATISTICS_STEP = 50, 20
 WHOLE = 13  # sequences of subject 5 in the complete data set
 BATCH = 256  # windows whose kinematics are computed at once
 GLOBAL = "linear, global"  # straight lines of global positions
+TRUTH = "truth"  # the row of the motion as it was
 LEAVES = [joint for joint in range(len(PARENTS)) if joint not in PARENTS]
 
 
@@ -242,6 +243,26 @@ def resign(rotation: np.ndarray, before: np.ndarray) -> np.ndarray:
 
 
 @dataclass
+class Seen:
+    """What users see of motion in gaps; means over windows.
+
+    Attributes:
+        slide, travel: of the feet, cm/s and m.
+        pop: the velocity jump at the keys, cm/frame^2, of the joint that jumps most.
+        bones: by how much their lengths change, cm.
+    """
+
+    slide: float
+    travel: float
+    pop: float
+    bones: float
+
+    def __str__(self) -> str:
+        feet = f"feet {self.slide:.1f} cm/s {self.travel:.2f} m"
+        return f"{feet}; pop {self.pop:.2f}; bones {self.bones:.2f} cm"
+
+
+@dataclass
 class Row:
     """What one method reached at one length of gap; see `Lafan1` for units."""
 
@@ -250,20 +271,17 @@ class Row:
     npss: float
     degrees: float
     milliseconds: float
-    slide: float | None = None
-    travel: float | None = None
-    pop: float | None = None
-    bones: float | None = None
+    seen: Seen | None = None
     fell_back: float | None = None
 
 
 @dataclass
 class Lafan1:
-    """The figures: `rows[method][gap]`.
+    """The figures: `rows[method][gap]`, and of the motion as it was, `truth[gap]`.
 
     l2p, l2q, npss as published; degrees by which global rotations are off; milliseconds a clip; of finished
-    fills also slide (cm/s) and travel (m) of the feet, the velocity jump at the keys (cm/frame^2), by how
-    much bones change (cm), and the share of fills that are the spline's, because the method's own did not do.
+    fills also what users see, and the share of fills that are the spline's, because the method's own did not
+    do.
     """
 
     name: str
@@ -271,6 +289,7 @@ class Lafan1:
     protocol: Protocol
     windows: dict[int, int] = field(default_factory=dict)
     rows: dict[str, dict[int, Row]] = field(default_factory=dict)
+    truth: dict[int, Seen] = field(default_factory=dict)
 
     def ratio(self, row: str, gap: int, figure: str) -> float:
         """To the protocol's own interpolation."""
@@ -284,10 +303,12 @@ class Lafan1:
             "data": self.name,
             "split": self.split,
             "windows": {str(gap): count for gap, count in self.windows.items()},
+            "truth": {str(gap): vars(seen) for gap, seen in self.truth.items()},
             "rows": {
                 name: {
                     str(gap): {
-                        **{key: value for key, value in vars(row).items() if value is not None},
+                        **{key: value for key, value in vars(row).items() if isinstance(value, float)},
+                        **(vars(row.seen) if row.seen else {}),
                         "ratios": {key: self.ratio(name, gap, key) for key in ("l2p", "l2q", "npss")},
                     }
                     for gap, row in held.items()
@@ -309,18 +330,19 @@ class Lafan1:
         """Markdown: what users see and the field does not print."""
 
         def cell(name: str, gap: int) -> str:
+            if name == TRUTH:
+                return str(self.truth[gap])
             row = self.rows[name][gap]
             figures = [f"{row.degrees:.1f} deg", f"{row.milliseconds:.1f} ms"]
-            if row.slide is not None:
-                figures += [f"feet {row.slide:.1f} cm/s {row.travel:.2f} m", f"pop {row.pop:.2f}"]
-                figures += [f"bones {row.bones:.2f} cm", f"{100 * (row.fell_back or 0):.0f} % fell back"]
+            if row.seen is not None:
+                figures += [str(row.seen), f"{100 * (row.fell_back or 0):.0f} % fell back"]
             return "; ".join(figures)
 
-        return self._markdown("", cell)
+        return self._markdown("", cell, TRUTH)
 
-    def _markdown(self, head: str, cell: Callable[[str, int], str]) -> str:
+    def _markdown(self, head: str, cell: Callable[[str, int], str], *more: str) -> str:
         gaps = list(self.windows)
-        rows = [[name, *(cell(name, gap) for gap in gaps)] for name in self.rows]
+        rows = [[name, *(cell(name, gap) for gap in gaps)] for name in (*self.rows, *more)]
         return markdown([head, *map(str, gaps)], rows)
 
     def plot(self, path: Path | None = None) -> str:
@@ -339,7 +361,8 @@ class Lafan1:
                 f"in brackets the ratio to {self.protocol.base}.",
                 *(self.table(figure, digits) for figure, digits in (("l2p", 4), ("l2q", 4), ("npss", 5))),
                 "Global rotations off in degrees; time a clip; of finished fills foot slide and travel, "
-                "velocity jump at keys (cm/frame^2), change of bones, share that fell back to the spline:",
+                "velocity jump at keys (cm/frame^2), change of bones, share that fell back to the spline; "
+                "last the motion as it was:",
                 self.extras(),
             ]
         )
@@ -387,6 +410,7 @@ def run(
         if gap not in cuts:
             cuts[gap] = cut(held.sequences, rules.window(gap), STEP, held.bones).spread(most)
             result.windows[gap] = len(cuts[gap])
+            result.truth[gap] = as_it_was(held, rules, cuts[gap], gap)
         method = None if name == GLOBAL else registry.get(name)
         row = measure(held, rules, cuts[gap], gap, method, finished)
         result.rows.setdefault(f"{name}, finished" if finished else name, {})[gap] = row
@@ -414,7 +438,7 @@ def measure(
             done, missing, fell_back = fill(clip, rules, gap, one, finished)
             rotation[i, first:last], root[i, first:last] = done.rotation[missing], done.root[missing]
             if finished:
-                extra.append((*_extra(done, missing), fell_back))
+                extra.append((*_seen(done, missing), fell_back))
         before = windows.rotation[:, part.start - 1] if first == 0 else rotation[:, 0]
         turned, placed = forward(resign(rotation, before), root, windows.bones)
     spent = 1000 * (time.perf_counter() - start) / len(windows)
@@ -422,13 +446,15 @@ def measure(
         above = [PARENTS[joint] for joint in LEAVES]
         for q in (turned, truth_turned):
             q[:, :, LEAVES] = q[:, :, above]
+    figures = _means(extra) if extra else None
     return Row(
         float(l2p(placed, truth, held.statistics).mean()),
         float(l2q(turned, truth_turned).mean()),
         npss(turned, truth_turned),
         float(np.degrees(rotations.angle(turned, truth_turned)).mean()),
         spent,
-        *(float(v) for v in (np.nanmean(extra, axis=0) if extra else ())),
+        Seen(*figures[:-1]) if figures else None,
+        figures[-1] if figures else None,
     )
 
 
@@ -464,8 +490,21 @@ def shown_clips(held: Data, rules: Protocol, windows: Windows, gap: int) -> Iter
         yield Clip(skeleton, rotation[part], root[part, None], 30.0, name=name)
 
 
-def _extra(done: Clip, missing: slice) -> tuple[float, float, float, float]:
-    """Slide (cm/s) and travel (m) of the feet, velocity jump at keys (cm/frame^2), change of bones (cm)."""
+def as_it_was(held: Data, rules: Protocol, windows: Windows, gap: int) -> Seen:
+    """What users would see of the motion that was there."""
+    missing = slice(*(frame - rules.shown(gap).start for frame in rules.hidden(gap)))
+    figures = [_seen(clip, missing) for clip in shown_clips(held, rules, windows, gap)]
+    return Seen(*_means(figures))
+
+
+def _means(rows: Sequence[Sequence[float]]) -> list[float]:
+    """Of each column; NaN, of which there may be nothing else, aside."""
+    means: list[float] = np.ma.masked_invalid(rows).mean(axis=0).filled(np.nan).tolist()
+    return means
+
+
+def _seen(done: Clip, missing: slice) -> tuple[float, float, float, float]:
+    """What `Seen` has of a clip in which some frames are, or were, missing."""
     seen = Observation.from_gaps(done, [Gap(missing.start, missing.stop)])
     slide, travel = feet.measure(done, seen, missing.start, missing.stop) or (np.nan, np.nan)
     keys = np.array([frame for frame in (missing.start - 1, missing.stop) if 0 < frame < len(done) - 1], int)
