@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from interpose.finish import Completion
     from interpose.formats import load, save
     from interpose.methods.registry import names as method_names
+    from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.scan import scan
     from interpose.tasks import Forecast, Stitched
@@ -46,6 +47,7 @@ __all__ = [
     "denoise",
     "fill",
     "forecast",
+    "license",
     "load",
     "method_names",
     "recover",
@@ -66,6 +68,7 @@ _HOMES = {
     "Pin": "interpose.observation",
     "RequestError": "interpose.errors",
     "Skeleton": "interpose.clip",
+    "license": "interpose.methods.weights:licensed",
     "load": "interpose.formats",
     "method_names": "interpose.methods.registry:names",
     "save": "interpose.formats",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from contextvars import copy_context
 
 from cyclopts import (
     App,
@@ -34,8 +35,11 @@ for verbs in VERBS.values():
 
 def run(tokens: list[str]) -> int:
     """Parse and call; returns the exit code. Raises RequestError when the tokens make no sense."""
+    # In a context of its own, so that what a command line says of licences holds for it alone.
+    here = copy_context()
     try:
-        code = app(
+        code = here.run(
+            app,
             tokens,
             console=screen(),
             exit_on_error=False,

@@ -28,6 +28,7 @@ def between(
     action: str = "",
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
+    license: str = "any",
     seed: int | None = None,
     player: bool = False,
     json: bool = False,
@@ -59,6 +60,7 @@ def between(
         action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
+        license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (keys.between.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
@@ -67,7 +69,7 @@ def between(
     from interpose import tasks
     from interpose.cli.request import check_method
 
-    check_method(method)
+    check_method(method, license)
     said = ""
     if file is not None and not (start or target or frames or anchor):
         chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)

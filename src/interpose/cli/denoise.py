@@ -23,6 +23,7 @@ def denoise(
     joints: list[str] = [],  # noqa: B006
     frames: str | None = None,
     method: str = "auto",
+    license: str = "any",
     seed: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     player: bool = False,
@@ -46,6 +47,7 @@ def denoise(
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
         frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0. All without it.
         method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
+        license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         output: where to write the clip; the report goes beside it.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.
@@ -60,7 +62,7 @@ def denoise(
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
-    check_method(method)
+    check_method(method, license)
     part = range_of(frames) if frames is not None else None
     clip = reading.load(file)
     outputs = Outputs.choose(file, output, "denoised", player)

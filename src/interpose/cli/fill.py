@@ -33,6 +33,7 @@ def fill(
     pin: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str | None = None,
+    license: str = "any",
     max_gap: int | None = None,
     only_gap: list[int] = [],  # noqa: B006
     seed: int | None = None,
@@ -73,6 +74,7 @@ def fill(
             to hold it there. May be repeated.
         output: where to write the filled clip; the report goes beside it.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
+        license: open to use only weights that may be used for anything; any (the default).
         max_gap: leave gaps of more than this many frames open, and list them.
         only_gap: fill only the gap of this number, counted from 1 in order of time. May be repeated.
         seed: for methods that sample.
@@ -98,8 +100,8 @@ def fill(
     request = from_options(file, clip, gap, [] if parts else joints, gaps, reading)
     request = replace(request, parts=request.parts + parts, path=request.path + path, pins=request.pins + pin)
     points, pins = path_of(request.path, clip), pins_of(request.pins, clip)
+    check_method(method or "auto", license)
     if method is not None:
-        check_method(method)
         request = replace(request, method=method, methods={})
     if only_gap:
         request = replace(request, only=only_gap, why={})

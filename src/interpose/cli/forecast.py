@@ -31,6 +31,7 @@ def forecast(
     temperature: float = 1.0,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
+    license: str = "any",
     player: bool = False,
     json: bool = False,
     force: bool = False,
@@ -64,7 +65,7 @@ def forecast(
     from interpose.cli.request import check_method
     from interpose.formats import save
 
-    check_method(method)
+    check_method(method, license)
     if samples > MOST:
         raise RequestError(
             f"cannot write {samples} samples", f"at most {MOST} are drawn at once", "Ask for fewer."

@@ -21,6 +21,7 @@ def recover(
     frames: str | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
+    license: str = "any",
     seed: int | None = None,
     player: bool = False,
     json: bool = False,
@@ -46,6 +47,7 @@ def recover(
         frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
         output: where to write the clip; the report goes beside it.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
+        license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (take.recovered.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
@@ -60,7 +62,7 @@ def recover(
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
-    check_method(method)
+    check_method(method, license)
     clip = reading.load(file)
     gap = range_of(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))

@@ -273,9 +273,15 @@ def roles_of(path: Path | None) -> dict[str, str]:
     return {str(name): str(own) for name, own in roles.items()} if isinstance(roles, dict) else {}
 
 
-def check_method(name: str) -> None:
-    """Raises RequestError listing all methods, auto among them, for a name that is none."""
-    from interpose.methods import registry
+def check_method(name: str, license: str) -> None:
+    """From now on weights of that licence alone are used.
+
+    Raises RequestError for another licence, and listing all methods, auto among them, for a name that is
+    none.
+    """
+    from interpose.methods import registry, weights
+
+    weights.allow(license)
 
     choices = list(dict.fromkeys(["auto", *registry.names()]))
     if name in choices:

@@ -51,6 +51,7 @@ def stitch(
     action: str = "",
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
+    license: str = "any",
     seed: int | None = None,
     player: bool = False,
     json: bool = False,
@@ -80,6 +81,7 @@ def stitch(
             cmib.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
+        license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (walk.stitched.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
@@ -88,7 +90,7 @@ def stitch(
     from interpose import tasks
     from interpose.cli.request import check_method
 
-    check_method(method)
+    check_method(method, license)
     if not files:
         raise RequestError("no clips are named", "it takes two or more", "Write stitch walk.bvh run.bvh.")
     pieces = [_read(text, reading) for text in files]

@@ -135,20 +135,20 @@ def own(
 
     Args:
         data: the folder with your clips.
-        from_: the weights to begin with: small, or a folder.
+        from_: the weights to begin with: small, small-open, or a folder.
         out: the folder for the new weights; the run goes into a folder within it, and goes on if it is there.
         budget: device time or steps: 10m, 1h, 2000steps.
         set: change a setting of the recipe: name=value. May be repeated.
     """
     with needs_torch("train a network"):
-        from interpose.training.base import CONFIGS, JUDGED, BaseSettings, judge, train_base
+        from interpose.training.base import JUDGED, BaseSettings, judge, train_base
         from interpose.training.export import export_base
     from interpose.datasets.own import own_pack
     from interpose.methods import weights
     from interpose.training.budget import Budget
 
     begin = weights.card(from_)
-    if begin.method not in CONFIGS:
+    if not begin.training["recipe"].startswith("interpose train base"):
         raise RequestError(
             f"{from_} cannot be fine-tuned",
             f"it belongs to {begin.method}; so far only interpose's own networks can",
@@ -158,7 +158,8 @@ def own(
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
     asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
     # Gently: what it knows of all motion is to stay.
-    settings = change(BaseSettings(config=begin.method, learning_rate=2e-4, every_seconds=60.0), set)
+    gentle = BaseSettings(config=begin.training["config"], learning_rate=2e-4, every_seconds=60.0)
+    settings = change(gentle, set)
     pack = own_pack(data, JUDGED, say)
     held = pack.splits == "validation"
     minutes = [float(pack.seconds[part].sum()) / 60 for part in (~held, held)]
@@ -198,6 +199,7 @@ def base(*, run: Run) -> None:
       interpose train base --packs packs --out runs/small --budget 2h
       interpose train base --out runs/base --set config=base
       interpose train base --out runs/lafan1 --set datasets=lafan1 --set tasks=gap
+      interpose train base --out runs/open --set datasets=cmu   (for any use)
       interpose train base --out runs/lines --set velocities=0   (a trial)
     """
     with needs_torch("train a network"):

@@ -15,7 +15,9 @@ from interpose.observation import Gap
 # `cmib` in a gap of a second; between two of them 6.1 and 6.3, with one more in the middle of two seconds 6.5
 # and 6.1. Where one joint, three or a limb are lost 7.1, 9.3 and 13.8 with `small`, 8.8, 13.9 and 16.5 with
 # `cae` (bench every).
-AMID, JOINTS, KEYS = ("small", "cae"), ("small", "cae"), ("cmib",)
+# `small-open` stands in where only weights for any use are installed, or asked for.
+AMID = JOINTS = ("small", "cae", "small-open")
+KEYS = ("cmib", "small", "small-open")
 
 
 def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
@@ -26,7 +28,7 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
     anything moves: there the network that was made for keys is better. The spline else, and where no weights
     are installed; then with the reason why no network fills a gap that would be its own.
     """
-    why = None
+    why, short = None, False
     for name in _candidates(gap, lone):
         try:
             card = weights.find(name)
@@ -34,14 +36,15 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
             why = why or f"{error.what}: {error.fix}"
             continue
         network = registry.get(name)
-        least = 0 if gap.joints is not None or name in KEYS else card.auto["from_gap"]
+        least = 0 if gap.joints is not None or lone == 2 else card.auto["from_gap"]
         if len(gap) * card.fps / clip.fps < least:
+            short = True
             continue
         reason = network.refuses(clip, gap)
         if reason is None:
             return network, None
         why = why or f"not filled by {name}: {reason}"
-    return registry.get("spline"), why
+    return registry.get("spline"), None if short else why
 
 
 def _candidates(gap: Gap, lone: int) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ class Base:
     """Completes poses by what it has seen; thinks at 30 fps on 22 joints scaled to one leg.
 
     Attributes:
-        name: of the weights: base or small.
+        name: of the weights: base, small or small-open.
         action: a label of its card; "" leaves it open.
         trained: the weights; the installed ones without any.
     """
@@ -44,7 +44,7 @@ class Base:
 
     @property
     def card(self) -> weights.Card:
-        return self.trained or weights.find(self.name)
+        return weights.of(self.name, self.trained)
 
     def for_action(self, action: str) -> Base:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
@@ -118,6 +118,11 @@ class Answer:
 def small() -> Base:
     """The one that is small enough for everywhere."""
     return Base("small")
+
+
+def small_open() -> Base:
+    """The same network, of weights for any use."""
+    return Base("small-open")
 
 
 def knowledge(observation: Observation, mapping: Mapping) -> np.ndarray:

@@ -103,7 +103,7 @@ class Cae:
 
     @property
     def card(self) -> weights.Card:
-        return self.trained or weights.find(self.name)
+        return weights.of(self.name, self.trained)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: a skeleton that is no humanoid, or a gap beyond what the network was trained for."""

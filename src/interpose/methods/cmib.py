@@ -90,7 +90,7 @@ class Cmib:
 
     @property
     def card(self) -> weights.Card:
-        return self.trained or weights.find(self.name)
+        return weights.of(self.name, self.trained)
 
     def for_action(self, action: str) -> Cmib:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""

@@ -22,6 +22,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
     "small": ("interpose.methods.base", "small"),
+    "small-open": ("interpose.methods.base", "small_open"),
 }
 
 # The entry-point group in which other packages offer methods: name = "package.module:Class".

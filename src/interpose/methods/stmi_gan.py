@@ -33,7 +33,7 @@ class StmiGan:
 
     @property
     def card(self) -> weights.Card:
-        return self.trained or weights.find(self.name)
+        return weights.of(self.name, self.trained)
 
     def at(self, temperature: float) -> StmiGan:
         """The same with more or less noise."""

@@ -3,15 +3,25 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from interpose.errors import FileError, RequestError, unknown
 
-# In a checkout the weights lie at its top; in an installed package inside it.
+# In a checkout all weights lie at its top. Installed, those for any use are inside of the package, and those
+# for research in a distribution of their own (weights/pyproject.toml).
+RESEARCH = "interpose_research_weights"
 FOLDERS = (Path(__file__).parents[3] / "weights", Path(__file__).parents[1] / "weights")
+# What weights may be asked to be licensed for: "open" are those that may be used for anything.
+LICENCES = ("any", "open")
+OPEN = "any use"  # what the licence of open weights begins with
+_licence: ContextVar[str] = ContextVar("licence", default="any")
 
 
 @dataclass(frozen=True)
@@ -53,6 +63,11 @@ class Card:
     path: Path = field(default=Path(), compare=False)
 
     @property
+    def open(self) -> bool:
+        """Whether the weights may be used for anything."""
+        return self.licence.startswith(OPEN)
+
+    @property
     def onnx(self) -> Path:
         return self.path.with_suffix(".onnx")
 
@@ -86,23 +101,82 @@ def session(path: Path) -> Any:
     return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
 
 
+def folders() -> list[Path]:
+    """Where weights lie: in a checkout, or in what is installed."""
+    if FOLDERS[0].is_dir():
+        return [FOLDERS[0]]
+    research = find_spec(RESEARCH)
+    places = [Path(place) for place in (research.submodule_search_locations or ())] if research else []
+    return [folder for folder in (*FOLDERS[1:], *places) if folder.is_dir()]
+
+
 @cache
 def cards() -> list[Card]:
     """The cards of all installed weights, by name."""
-    folder = next((folder for folder in FOLDERS if folder.is_dir()), None)
-    return [Card.load(path) for path in sorted(folder.glob("*/*.json"))] if folder else []
+    found = [Card.load(path) for folder in folders() for path in folder.glob("*/*.json")]
+    return sorted(found, key=lambda card: card.name)
+
+
+def allow(licence: str) -> None:
+    """From now on use weights of that licence alone, in this context: one of LICENCES.
+
+    Raises RequestError for another one.
+    """
+    if licence not in LICENCES:
+        raise unknown("licence", licence, LICENCES)
+    _licence.set(licence)
+
+
+@contextmanager
+def licensed(licence: str) -> Iterator[None]:
+    """Within it methods use weights of that licence alone: "open" for those that may be used for anything.
+
+    What chooses a method by itself chooses among these; a method whose weights are not among them is refused.
+
+        with interpose.license("open"):
+            done = interpose.fill("take.bvh", "120:160")
+
+    Args:
+        licence: "open", or "any", as it is without.
+
+    Raises:
+        RequestError: another licence.
+    """
+    before = _licence.get()
+    allow(licence)
+    try:
+        yield
+    finally:
+        _licence.set(before)
+
+
+def allowed(card: Card) -> Card:
+    """The card, if its weights may be used. RequestError otherwise."""
+    if _licence.get() == "open" and not card.open:
+        others = [one.method for one in cards() if one.open]
+        raise RequestError(
+            f"the weights of {card.name} are not open",
+            f"their licence: {card.licence}",
+            f"Use --method {' or '.join([*others, 'spline'])}, or leave out --license open.",
+        )
+    return card
 
 
 def find(method: str) -> Card:
-    """The weights that a method runs. Raises RequestError when there are none."""
+    """The weights that a method runs. Raises RequestError when there are none, or none that may be used."""
     for card in cards():
         if card.method == method and card.onnx.exists():
-            return card
+            return allowed(card)
     raise RequestError(
         f"there are no weights for the method {method}",
-        f"none lie in {' or '.join(str(folder) for folder in FOLDERS)}",
-        "Install interpose with its weights, or use --method spline.",
+        f"none lie in {' or '.join(map(str, folders())) or 'any of the places for them'}",
+        "Install those for research, too (pip install ./weights), or use --method spline.",
     )
+
+
+def of(method: str, trained: Card | None) -> Card:
+    """The weights that somebody trained for a method, or else the installed ones; raises as `find` does."""
+    return allowed(trained) if trained else find(method)
 
 
 def load(folder: Path, method: str) -> Card:

@@ -17,7 +17,8 @@ from torch.nn.attention import SDPBackend, sdpa_kernel
 from interpose.datasets import DATASETS, Pack
 from interpose.datasets.own import NAME as OWN
 from interpose.errors import RequestError
-from interpose.methods.weights import Card
+from interpose.methods.registry import METHODS
+from interpose.methods.weights import OPEN, Card
 from interpose.models.base import Base, BaseConfig
 from interpose.models.cae import Infiller
 from interpose.models.cmib import Cmib, CmibConfig
@@ -25,7 +26,7 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig
 from interpose.models.stmi_gan import Generator, StmiGanConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
-from interpose.training.base import chosen
+from interpose.training.base import chosen, title
 from interpose.training.cae import NETWORKS
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 
@@ -37,7 +38,6 @@ LICENCES = {
     OWN: "your own",
 }
 RESEARCH = "research and non-commercial use: the training data is licensed so"
-OPEN = "any use: trained on CMU data alone"
 # What the recipe of the autoencoder trains, for the card; the others are there to be compared with.
 DESCRIPTIONS = {
     "cae": "Convolutional autoencoder for infilling (Kaufmann et al. 2020)",
@@ -327,13 +327,13 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
 def export_base(
     folder: Path, packs: list[Pack], out: Path, splits: list[str], licence: str | None = None
 ) -> Card:
-    """Write `base.onnx` or `small.onnx`, its card, the log and its curves into `out` from a run's folder.
+    """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
 
     licence: what the weights may be used for, where the packs do not decide.
     """
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     network = settings.pop("network")
-    name, labels = settings["config"], network["labels"]
+    name, labels = title(settings["config"], settings["datasets"]), network["labels"]
     _check_free(out, name)
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
@@ -346,7 +346,7 @@ def export_base(
     packs = chosen(packs, settings["datasets"])
     card = Card(
         name=name,
-        method=name,
+        method=name if name in METHODS else settings["config"],
         description="interpose's own network: whatever is missing of a motion",
         licence=licence or _licence(packs),
         data=_data(packs, splits),
@@ -378,7 +378,7 @@ def paces(packs: list[Pack], splits: list[str]) -> dict[str, list[float]]:
 
 
 def _licence(packs: list[Pack]) -> str:
-    return OPEN if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH
+    return f"{OPEN}: trained on CMU data alone" if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH
 
 
 def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
