@@ -6,7 +6,7 @@ import json
 
 import pytest
 
-from interpose.errors import FileError
+from interpose.errors import FileError, RequestError
 from interpose.evaluation.recipes import compare
 
 
@@ -33,6 +33,10 @@ def test_what_differs_and_what_came_of_it(runs):
     assert plain == "| plain | - | 10 | 0.10 | 7.5 |"
     assert squared == "| squared | loss=l2 | 10 | 0.10 | 8.25 |"
     assert result.to_dict()["runs"][1]["gap15"] == 8.25
+    assert compare(runs, ("gap15",)).table() == result.table()
+    with pytest.raises(RequestError, match="unknown figure: gap30") as error:
+        compare(runs, ("gap30",)).table()
+    assert "gap15" in error.value.why
 
 
 @pytest.mark.parametrize("spoil", ["no log", "empty", "no json", "another file", "no folder"])

@@ -363,6 +363,7 @@ def reliability(
 @bench.command
 def recipes(
     *runs: Annotated[Path, Parameter(name="RUNS")],
+    figures: list[str] = [],  # noqa: B006
     json: bool = False,
     markdown: bool = False,
 ) -> None:
@@ -374,19 +375,22 @@ def recipes(
       interpose train cae --out runs/l1 --budget 1200steps
       interpose train cae --out runs/l2 --budget 1200steps --set loss=l2
       interpose bench recipes runs/l1 runs/l2
+      interpose bench recipes studies/base/* --figures ratio5,ratio15,ratio30,ratio45
 
     Args:
         runs: folders that interpose train wrote; the first is what the others are compared with.
+        figures: names of those to show, separated by commas; all without any.
         json: print JSON for other programs.
         markdown: print only the table, in Markdown.
     """
+    from interpose.cli.reading import split_names
     from interpose.evaluation.recipes import compare
 
     if not runs:
         raise RequestError(
             "no runs are named", "there is nothing to compare", "Name folders: runs/l1 runs/l2."
         )
-    result = compare(runs)
+    result = compare(runs, split_names(figures))
     if json:
         say_json(result.to_dict())
     else:

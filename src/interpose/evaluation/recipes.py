@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from interpose.errors import FileError
+from interpose.errors import FileError, unknown
 from interpose.evaluation.table import markdown
 
 # What says how long a run has lasted, and no figure of what it reached.
@@ -30,14 +30,23 @@ class Run:
 
 @dataclass(frozen=True)
 class Recipes:
-    """Runs, in the order in which they were named; the first one is what others are compared with."""
+    """Runs, in the order in which they were named; the first one is what others are compared with.
+
+    Attributes:
+        runs: the runs.
+        chosen: the names of the figures to show; all that were measured of all runs without any.
+    """
 
     runs: tuple[Run, ...]
+    chosen: tuple[str, ...] = ()
 
     @property
     def figures(self) -> list[str]:
-        """What was measured of all runs."""
-        return [n for n in self.runs[0].last if n not in PROGRESS and all(n in run.last for run in self.runs)]
+        """The names of what was measured of all runs, or of it what is to be shown."""
+        held = [n for n in self.runs[0].last if n not in PROGRESS and all(n in run.last for run in self.runs)]
+        if bad := [name for name in self.chosen if name not in held]:
+            raise unknown("figure", bad[0], held)
+        return list(self.chosen) or held
 
     def differs(self, run: Run) -> dict[str, Any]:
         """The settings of a run that are not those of the first one."""
@@ -68,9 +77,17 @@ class Recipes:
         return f"Validation performers, at the end of each run.\n\n{self.table()}"
 
 
-def compare(folders: Sequence[Path]) -> Recipes:
-    """Read runs. Raises FileError for a folder that holds none, or one that has measured nothing yet."""
-    return Recipes(tuple(_read(folder) for folder in folders))
+def compare(folders: Sequence[Path], figures: Sequence[str] = ()) -> Recipes:
+    """Read runs.
+
+    Args:
+        folders: of the runs.
+        figures: names of those to show.
+
+    Raises:
+        FileError: a folder that holds no run, or one that has measured nothing yet.
+    """
+    return Recipes(tuple(_read(folder) for folder in folders), tuple(figures))
 
 
 def _read(folder: Path) -> Run:

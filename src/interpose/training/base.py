@@ -282,9 +282,10 @@ def train_base(
     settings = settings or BaseSettings()
     device = pick_device()
     torch.manual_seed(settings.seed)
-    packs = chosen(packs, settings.datasets)
-    labels = tuple(start.labels) if start else labels_of(packs, splits)
-    poses = Poses(packs, splits, labels, SHORTEST, device)
+    kept = chosen(packs, settings.datasets)
+    labels = tuple(start.labels) if start else labels_of(kept, splits)
+    poses = Poses(kept, splits, labels, SHORTEST, device)
+    # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
     model = Base(settings.network(labels)).to(device)
     if start:

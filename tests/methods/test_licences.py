@@ -1,0 +1,106 @@
+"""Which weights may be used, and where they lie once they are installed."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import interpose
+from interpose.cli import main
+from interpose.errors import RequestError
+from interpose.methods import auto, registry, weights
+from interpose.observation import Gap
+
+ROOT = Path(__file__).parents[2]
+DATA = ROOT / "tests" / "data"
+
+
+@pytest.fixture
+def walk():
+    return interpose.load(DATA / "cmu_walk.bvh")
+
+
+def second(clip: interpose.Clip) -> Gap:
+    """A gap of a second in the middle."""
+    return Gap(len(clip) // 2, len(clip) // 2 + round(clip.fps))
+
+
+def test_only_open_weights_where_that_is_asked_for(walk):
+    """What chooses by itself chooses among them, a method with others is refused, and after it all is as before."""
+    gap = second(walk)
+    assert auto.choose(walk, gap)[0].name == "small"
+    with interpose.license("open"):
+        for lone in (0, 2):
+            assert auto.choose(walk, gap, lone)[0].name == "small-open"
+        assert auto.choose(walk, Gap(gap.start, gap.stop, ("LeftArm",)))[0].name == "small-open"
+        # Short gaps are the spline's with any weights: nothing to be said of that.
+        method, why = auto.choose(walk, Gap(gap.start, gap.start + 2))
+        assert (method.name, why) == ("spline", None)
+        done = interpose.fill(walk, gap)
+        assert (done.report.gaps[0].method, done.report.gaps[0].model) == ("small-open", "small-open")
+        with pytest.raises(RequestError, match="small are not open") as refused:
+            interpose.fill(walk, gap, method="small")
+        assert "research" in refused.value.why
+        assert "small-open or spline" in refused.value.fix
+        with pytest.raises(RequestError, match="cae are not open"):
+            interpose.fill(walk, gap, method=str(ROOT / "weights" / "cae"))
+    assert auto.choose(walk, gap)[0].name == "small"
+
+
+def test_unknown_licences_list_the_known_ones():
+    with pytest.raises(RequestError, match="unknown licence: closed") as error, interpose.license("closed"):
+        pass
+    assert "any, open" in error.value.why
+
+
+def test_a_command_line_asks_for_itself_alone(walk, tmp_path, capsys):
+    gap = second(walk)
+    take = ["fill", str(DATA / "cmu_walk.bvh"), "--gap", f"{gap.start}:{gap.stop}", "--dry-run"]
+    assert main([*take, "--license", "open"]) == 0
+    assert "small-open" in capsys.readouterr().out
+    assert main([*take, "--license", "open", "--method", "cae"]) == 2
+    assert "licence: research" in capsys.readouterr().err
+    assert main(take) == 0
+    assert "small-open" not in capsys.readouterr().out
+
+
+def test_without_weights_for_research(walk, monkeypatch, tmp_path):
+    """As with the wheel alone: open weights, inside of the package, stand in."""
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (inside / "small-open").symlink_to(ROOT / "weights" / "small-open", target_is_directory=True)
+    monkeypatch.setattr(weights, "FOLDERS", (tmp_path / "no checkout", inside))
+    weights.cards.cache_clear()
+    try:
+        assert [card.name for card in weights.cards()] == ["small-open"]
+        for lone in (0, 2):
+            assert auto.choose(walk, second(walk), lone)[0].name == "small-open"
+        with pytest.raises(RequestError, match="no weights for the method cae") as error:
+            interpose.fill(walk, second(walk), method="cae")
+        assert "pip install ./weights" in error.value.fix
+        # Beside them the distribution for research, as a package that is only a folder.
+        package = tmp_path / "site" / weights.RESEARCH
+        package.mkdir(parents=True)
+        (package / "cae").symlink_to(ROOT / "weights" / "cae", target_is_directory=True)
+        monkeypatch.syspath_prepend(tmp_path / "site")
+        weights.cards.cache_clear()
+        assert [card.name for card in weights.cards()] == ["cae", "small-open"]
+    finally:
+        weights.cards.cache_clear()
+
+
+def test_the_wheels_carry_what_their_licences_allow():
+    """Open weights in the one, those for research in the other, and none in neither."""
+    own, research = (
+        tomllib.loads((folder / "pyproject.toml").read_text())["tool"]["hatch"]["build"]["targets"]["wheel"]
+        for folder in (ROOT, ROOT / "weights")
+    )
+    held = {card.name: card for card in weights.cards()}
+    inside = [Path(path).name for path in own["only-include"] if path.startswith("weights/")]
+    assert all(held[name].open for name in inside)
+    assert not any(held[name].open for name in research["only-include"])
+    assert {*inside, *research["only-include"]} == {*held}
+    assert all({one["name"] for one in held[name].data} == {"cmu"} for name in inside)
+    assert registry.get(inside[0]).name == inside[0]
