@@ -54,6 +54,27 @@ def test_a_sliding_stance_is_held_where_it_is_observed(walk, speaking):
         assert np.ptp(track, axis=0).max() < 0.02
 
 
+def test_a_method_that_knows_better_says_which_feet_stand(walk):
+    """Feet that drift with all else are held, but for those of which it says that they do not stand."""
+    known = gaps_of(walk, (45, 75))
+    drift = np.clip((np.arange(120) - 45) / 30, 0, 1)[:, None, None] * [0.0, 0.0, 0.06]
+    slid = walk.with_motion(walk.rotation, walk.translation + drift)
+    stands = np.full((120, 4), np.nan)
+    held = feet.plant(slid, known, (45, 75), stands=stands)
+    assert np.abs(held.rotation - slid.rotation).max() > 1e-3
+    stands[:, 2:] = 0.1
+    told = feet.plant(slid, known, (45, 75), stands=stands)
+    left, right = (
+        [leg.thigh, leg.knee, leg.ankle] for leg in sorted(feet.legs(walk.skeleton), key=lambda leg: leg.side)
+    )
+    assert told.rotation[:, left].tobytes() == held.rotation[:, left].tobytes()
+    shifts = [
+        np.abs(one.positions() - slid.positions())[..., [0, 2]].max(axis=(0, 2)) for one in (held, told)
+    ]
+    assert shifts[0][right[2]] > 0.02
+    assert shifts[1][right[2]] < 0.01
+
+
 def test_feet_do_not_sink(walk, speaking):
     method = speaking(walk, sigma=0.0)
     method.positions[:, :, 1] -= 0.04 * np.sin(np.clip((np.arange(120) - 35) / 50, 0, 1) * np.pi)[:, None]

@@ -276,17 +276,16 @@ def roles_of(path: Path | None) -> dict[str, str]:
 def check_method(name: str, license: str) -> None:
     """From now on weights of that licence alone are used.
 
-    Raises RequestError for another licence, and listing all methods, auto among them, for a name that is
-    none.
+    Raises RequestError for another licence, for a method whose weights may not be used, and listing all
+    methods, auto among them, for a name that is none.
     """
     from interpose.methods import registry, weights
 
     weights.allow(license)
 
     choices = list(dict.fromkeys(["auto", *registry.names()]))
-    if name in choices:
-        return
-    if Path(name).is_dir():
-        registry.get(name)
-    else:
+    if name not in choices and not Path(name).is_dir():
         raise unknown("method", name, choices)
+    if name != "auto":
+        # Of those that have weights the card, which is refused where it may not be used.
+        getattr(registry.get(name), "card", None)

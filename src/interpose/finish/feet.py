@@ -29,11 +29,14 @@ STILL, LEVEL = 0.30, 0.08
 # Seconds over which a correction comes and goes outside of a contact, and vanishes towards a seam: firm, and
 # softer ones for feet that would be torn into place.
 BLENDS = (0.15, 0.25, 0.40)
-# A foot may sink this far (metres) below the lowest stances nearby; the bound is rounded off over as much.
-SINK = 0.005
-# Metres by which a foot clears the floor once it is twice as fast as QUICK (metres a second), and the share
-# of BLEND over which it is lifted.
-CLEAR, QUICK, SOFT = 0.03, 0.50, 0.5
+# Metres that a foot may sink below the lowest stances nearby (the bound is rounded off over as much), and by
+# which it clears the floor once it is twice as fast as QUICK (metres a second). A method that knows when feet
+# stand also knows how high they go: lifted as far as others' they slide half as much as people's do, at the
+# cost of more error than all else that is done to its motion. SOFT: the share of BLEND over which it comes.
+OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.015)
+QUICK, SOFT = 0.50, 0.5
+# A contact that the method takes for less likely than this is none.
+LIKELY = 0.5
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -46,6 +49,7 @@ class Leg:
     knee: int
     ankle: int
     toe: int | None
+    side: int = 0  # 0 for the left one, 1 for the right one
 
     @property
     def foot(self) -> list[int]:
@@ -57,14 +61,14 @@ def legs(skeleton: Skeleton) -> tuple[Leg, ...]:
     """The legs that the skeleton has; none when they are not found."""
     mapping = find_mapping(skeleton)
     found = []
-    for side in ("Left", "Right"):
+    for number, side in enumerate(("Left", "Right")):
         thigh, knee, ankle, toe = (mapping[side + part] for part in ("UpLeg", "Leg", "Foot", "Toe"))
         if thigh is None or knee is None or ankle is None:
             continue
         chain = [joint for joint in (thigh, knee, ankle, toe) if joint is not None]
         bones = np.linalg.norm(skeleton.rest_translation[[knee, ankle]], axis=1)
         if bones.min() > 1e-6 and all(a in skeleton.ancestors(b) for a, b in zip(chain, chain[1:])):
-            found.append(Leg(thigh, knee, ankle, toe))
+            found.append(Leg(thigh, knee, ankle, toe, number))
     return tuple(found)
 
 
@@ -144,11 +148,25 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     return list(zip(slides, [measures.foot_travel(positions[part]) for part in parts]))
 
 
-def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = BLENDS[0]) -> Clip:
+def plant(
+    clip: Clip,
+    known: Observation,
+    span: tuple[int, int],
+    blend: float = BLENDS[0],
+    stands: np.ndarray | None = None,
+) -> Clip:
     """Hold the feet during contacts in the span, and keep them above the floor.
 
     Only unobserved rotations of a leg move: where any of thigh, knee or ankle is observed, the leg is left
-    alone, and towards such frames the correction fades out. Bones never stretch. `blend` is in seconds.
+    alone, and towards such frames the correction fades out. Bones never stretch.
+
+    Args:
+        clip, known: the motion, and what of it is observed.
+        span: the frames start to stop - 1 in which anything may move.
+        blend: seconds over which a correction comes and goes.
+        stands: (F, 4) how likely left ankle and toe, right ankle and toe stand, 0 to 1, by the method that
+            made the motion: a foot is held where it is slow and low, unless this says that it does not stand.
+            NaN, and None, where it says nothing.
     """
     skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
@@ -156,6 +174,7 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = 
     free = [np.asarray((~known.rotation[:, chain]).all(axis=1)) for chain in joints]
     if not any(f[start:stop].any() for f in free):
         return clip
+    sink, clear = OTHERS if stands is None else KNOWING
     rotation = clip.rotation.copy()
     turned, placed = clip.kinematics()
     seen, grown = known.positions(skeleton), size(skeleton)
@@ -169,10 +188,13 @@ def plant(clip: Clip, known: Observation, span: tuple[int, int], blend: float = 
         feet = placed[:, leg.foot] / grown
         floor = local_floor(feet, seen[:, leg.foot], clip.fps)
         planted = contacts(feet, floor, clip.fps)
+        if stands is not None:
+            said = stands[:, 2 * leg.side : 2 * leg.side + 2]
+            planted &= ~(said < LIKELY)
         shift = _hold(feet, planted, movable, clip.fps, over)
         speeds = measures.speed(feet + shift, clip.fps)
-        lowest = floor - SINK + CLEAR * ramp(speeds / QUICK - 1)
-        lift = _smooth(_lift((lowest - feet[..., 1]).max(axis=1)), over)
+        lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
+        lift = _smooth(_lift((lowest - feet[..., 1]).max(axis=1), sink), over)
         shift[..., 1] += (lift * np.prod(_envelope(movable, over), axis=0))[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
@@ -231,9 +253,9 @@ def _smooth(lift: np.ndarray, over: float) -> np.ndarray:
     return ndimage.gaussian_filter1d(wide, reach / 2, mode="nearest")
 
 
-def _lift(depth: np.ndarray) -> np.ndarray:
-    """How far to lift what lies `depth` below the floor: max(depth, 0) with a rounded corner."""
-    return np.where(depth > SINK, depth, np.maximum(depth + SINK, 0.0) ** 2 / (4 * SINK))
+def _lift(depth: np.ndarray, sink: float) -> np.ndarray:
+    """How far to lift what lies `depth` below the floor: max(depth, 0), its corner rounded off by `sink`."""
+    return np.where(depth > sink, depth, np.maximum(depth + sink, 0.0) ** 2 / (4 * sink))
 
 
 def _envelope(movable: np.ndarray, over: float) -> tuple[np.ndarray, np.ndarray]:

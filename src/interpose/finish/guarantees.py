@@ -166,7 +166,7 @@ def complete(
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
             if source is not opinion or not (isinstance(method, Layer) and method.stands):
-                _plant(current, known, span, bounds)
+                _plant(current, known, span, bounds, raw.stands if source is opinion else None)
         for _ in range(ROUNDS):
             for span in chosen:
                 _soften(current, known, span, limit)
@@ -508,7 +508,9 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _
         _write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
 
 
-def _plant(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> None:
+def _plant(
+    current: Clip, known: Observation, span: _Span, bounds: _Bounds | None, stands: np.ndarray | None
+) -> None:
     """Hold the feet of a span as firmly as they bear: with jumps that the observed motion has, too, or as
     softly as possible with those that a gap may have at most."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
@@ -516,7 +518,7 @@ def _plant(current: Clip, known: Observation, span: _Span, bounds: _Bounds | Non
     slide, peak = feet.measure(loose, seen, *inner), _jump(loose, seen, frames) or 0.0
     chosen = None
     for blend in feet.BLENDS:
-        held = feet.plant(loose, seen, inner, blend)
+        held = feet.plant(loose, seen, inner, blend, None if stands is None else stands[lo:hi])
         slides, jump = feet.measure(held, seen, *inner), _jump(held, seen, frames) or 0.0
         if slide is None or slides is None or slides[0] > slide[0]:
             break  # holding feet made them slide: it was about something else than stances

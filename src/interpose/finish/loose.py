@@ -63,4 +63,4 @@ class Layer:
         )
         rotation = rotations.multiply(self.body.rotation, change.clip.rotation)
         own = self.body.with_motion(rotation, self.body.translation)
-        return Raw(own, notes=self.raw.notes, expected=self.raw.expected)
+        return Raw(own, notes=self.raw.notes, stands=self.raw.stands, expected=self.raw.expected)

@@ -22,8 +22,9 @@ from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import PARENTS, Mapping, find_mapping
+from interpose.skeletons import JOINTS, PARENTS, Mapping, find_mapping
 
+FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
 CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
 COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
 
@@ -95,9 +96,10 @@ class Base:
         local[missing] = np.where(known[missing, : len(PARENTS), None], local[missing], own)
         root[missing] = np.where(known[missing, -1:], root[missing], sample_smooth(answer.root, back))
         done = body.to_clip(kinematics.global_rotations(local, PARENTS), root / body.scale, base)
-        expected = np.full(len(clip), np.nan)
+        stands, expected = np.full((len(clip), len(FEET)), np.nan), np.full(len(clip), np.nan)
+        stands[missing] = sample(answer.stands, back)
         expected[missing] = sample(answer.expected[:, None], back)[:, 0] / body.scale
-        return Raw(done, notes={"model": card.name}, expected=expected)
+        return Raw(done, notes={"model": card.name}, stands=stands, expected=expected)
 
 
 @dataclass
@@ -107,11 +109,13 @@ class Answer:
     Attributes:
         local: (T, 22, 4) canonical rotations relative to the parent's; float64.
         root: (T, 3) metres, the hips.
+        stands: (T, 4) how likely ankles and toes stand, 0 to 1.
         expected: (T,) metres that joints are expected to be off.
     """
 
     local: np.ndarray
     root: np.ndarray
+    stands: np.ndarray
     expected: np.ndarray
 
 
@@ -195,9 +199,9 @@ def run(
         "label": np.array([label]),
         "bones": bones[None].astype(np.float32),
     }
-    names = ["local_out", "root_out", "error"]
-    turned, placed, off = (out[0].astype(float) for out in weights.session(path).run(names, feed))
-    return Answer(rotations.normalize(turned), placed + origin, off / 100)
+    names = ["local_out", "root_out", "contact", "error"]
+    turned, placed, stands, off = (out[0].astype(float) for out in weights.session(path).run(names, feed))
+    return Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
 
 
 def run_long(
@@ -215,7 +219,7 @@ def run_long(
     completes as much as half of it, which is taken as known from then on.
     """
     local, root, known = local.copy(), root.copy(), known.copy()
-    expected = np.zeros(len(root))
+    stands, expected = np.zeros((len(root), len(FEET))), np.zeros(len(root))
     for begin, end in runs(np.logical_not(known.all(axis=1))):
         while begin < end:
             short = end - begin <= card.max_gap
@@ -231,7 +235,7 @@ def run_long(
             held = known[inside]
             local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
             root[inside] = np.where(held[:, -1:], root[inside], said.root[own])
-            expected[inside] = said.expected[own]
+            stands[inside], expected[inside] = said.stands[own], said.expected[own]
             known[inside] = True
             begin = stop
-    return Answer(local, root, expected)
+    return Answer(local, root, stands, expected)

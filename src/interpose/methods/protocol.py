@@ -28,8 +28,9 @@ class Raw:
         notes: what a report should say (drift of the root trajectory, model, ...).
         own: (F, J, 3) a network's own poses in the body's frame (hips over the origin, facing along Z),
             before they are settled into what is observed: the papers' tables lay them on the true way.
-        expected: (F,) metres that joints are expected to be off in the mean, for methods that say so; NaN at
-            frames of which they do not.
+        stands: (F, 4) how likely left ankle, left toe, right ankle and right toe stand, 0 to 1, for methods
+            that say so; NaN at frames of which they do not.
+        expected: (F,) metres that joints are expected to be off in the mean; NaN likewise.
     """
 
     clip: Clip
@@ -37,6 +38,7 @@ class Raw:
     joints: tuple[int, ...] = ()
     notes: dict[str, Any] = field(default_factory=dict)
     own: np.ndarray | None = None
+    stands: np.ndarray | None = None
     expected: np.ndarray | None = None
 
 

@@ -339,7 +339,7 @@ def export_base(
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)
     export_base_onnx(model, out / f"{name}.onnx")
-    log, earlier, _ = _history(folder)
+    log, earlier, auto = _history(folder)
     (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
@@ -356,6 +356,7 @@ def export_base(
         max_gap=settings["longest"],
         training={**_training("base", settings, splits, log, earlier, model), "network": network},
         metrics={"validation": log[-1]},
+        auto=auto,
         labels=labels,
     )
     card.save(out / f"{name}.json")
