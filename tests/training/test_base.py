@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 import json
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
+onnx = pytest.importorskip("onnx")
 
 from interpose import tasks  # noqa: E402
-from interpose.errors import RequestError  # noqa: E402
+from interpose.errors import FileError, RequestError  # noqa: E402
 from interpose.geometry import kinematics, rotations  # noqa: E402
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods import base as method  # noqa: E402
@@ -18,9 +20,11 @@ from interpose.methods import registry, weights  # noqa: E402
 from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns, room  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
+from interpose.training import export  # noqa: E402
 from interpose.training.base import TASKS, BaseSettings, chosen, draw_task, train_base  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.export import export_base  # noqa: E402
+from interpose.training.loop import restore, shard_paths  # noqa: E402
 from interpose.training.poses import Poses, labels_of  # noqa: E402
 
 TINY = BaseConfig(("", "walk"), width=24, heads=2, layers=1, longest=140)
@@ -196,6 +200,36 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
+
+
+def test_eight_bits_for_running_and_sixteen_for_training_on(model, given, tmp_path, monkeypatch):
+    """The graph says what the network says, to little of what that adds; training goes on from 16 bits."""
+    path, one = tmp_path / "small.onnx", copy.deepcopy(model).float()
+    monkeypatch.setattr(export, "SHARD", 20_000)
+    export.export_base_onnx(one, path)
+    held = {one.name: one for one in onnx.load(path).graph.initializer}
+    inner = [v for v in held.values() if v.data_type == onnx.TensorProto.INT8 and len(v.dims) == 2]
+    assert len(inner) == 5, "four matrices of a block, and the last one"
+    expected = one(*(v.float() if v.is_floating_point() else v for v in given))
+    local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
+    said = method.run(path, local, root, known == 1, int(given[5][0]), bones, (pinned, pins))
+    start = one.start(*(v.float() for v in given[:3]), given[-1].float()).motion
+    off = rotations.angle(said.local, expected[0][0].detach().double().numpy()).mean()
+    assert off < 0.03 * rotations.angle(expected[0][0], start.local[0]).mean()
+    off = np.abs(said.root - expected[1][0].detach().numpy()).mean()
+    assert off < 0.03 * (expected[1][0] - start.root[0]).abs().mean()
+
+    shards = shard_paths(path)
+    assert len(shards) > 1
+    assert all(shard.stat().st_size < 30_000 for shard in shards)
+    again = Base(TINY)
+    restore(again, path)
+    for mine, theirs in zip(again.state_dict().values(), one.state_dict().values()):
+        assert torch.equal(mine, theirs.half().float())
+    for shard in shards:
+        shard.unlink()
+    with pytest.raises(FileError, match=r"cannot start from small\.onnx"):
+        restore(again, path)
 
 
 def test_it_completes_clips(trained, cmu_walk, monkeypatch):

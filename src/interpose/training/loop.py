@@ -67,26 +67,45 @@ def commit() -> str:
         return "unknown"
 
 
-def restore(model: nn.Module, path: Path) -> None:
-    """Fill a model with the weights that an exported graph holds (16 bits of them, where they are large).
+def shard_paths(path: Path) -> list[Path]:
+    """The files of safetensors that lie beside a graph: one of its name, or numbered ones."""
+    numbered = path.parent.glob(f"{path.stem}-[0-9]*-of-*.safetensors")
+    return sorted([*path.parent.glob(f"{path.stem}.safetensors"), *numbered])
 
-    A part that begins with nothing may be missing: without it the network is the one that was exported.
-    """
+
+def _exported(path: Path) -> dict[str, Tensor]:
+    """The weights of an exported graph by name: those beside it, or else those that it holds itself."""
+    if shards := shard_paths(path):
+        from safetensors.torch import load_file
+
+        return {name: value for shard in shards for name, value in load_file(shard).items()}
     import onnx
     from onnx import numpy_helper
 
-    held = {one.name.removesuffix(".half"): one for one in onnx.load(path).graph.initializer}
+    graph = onnx.load(path).graph
+    return {
+        one.name.removesuffix(".half"): torch.from_numpy(numpy_helper.to_array(one).astype(np.float32))
+        for one in graph.initializer
+    }
+
+
+def restore(model: nn.Module, path: Path) -> None:
+    """Fill a model with the weights of an exported graph (16 bits of them, where they are large).
+
+    A part that begins with nothing may be missing: without it the network is the one that was exported.
+    """
+    held = _exported(path)
     with torch.no_grad():
         for name, value in model.state_dict().items():
             if name not in held and not value.any():
                 continue
-            if name not in held or list(held[name].dims) != list(value.shape):
+            if name not in held or held[name].shape != value.shape:
                 raise FileError(
                     f"cannot start from {path.name}",
                     f"it has no {name} of the shape {list(value.shape)}",
                     "Name weights of the same network.",
                 )
-            value.copy_(torch.from_numpy(numpy_helper.to_array(held[name]).astype(np.float32)))
+            value.copy_(held[name])
 
 
 @dataclass
