@@ -8,28 +8,26 @@ from interpose.methods import registry, weights
 from interpose.methods.protocol import Method
 from interpose.observation import Gap
 
-# Networks for gaps of the whole pose, for joints missing on their own, and between two lone keys, the
-# best one first; measured on validation performers. Amid motion joints are off by 1.8, 4.1 and 8.3 cm with
-# `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on these
-# performers, 2.4, 6.4, 11.4 with the spline (bench threshold). Before a lone key 5.0 with `small`, 6.0 with
-# `cmib` in a gap of a second; between two of them 6.1 and 6.3, with one more in the middle of two seconds 6.5
-# and 6.1. Where one joint, three or a limb are lost 7.1, 9.3 and 13.8 with `small`, 8.8, 13.9 and 16.5 with
-# `cae` (bench every).
+# Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
+# keys, the best one first; measured on validation performers. Amid motion joints are off by 1.8, 3.8 and
+# 7.8 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
+# these performers, 2.7, 6.6, 12.4 with the spline (bench threshold). Between two lone keys a second apart 5.6
+# with `small` and 6.3 with `cmib`, two seconds apart with one more in the middle 5.9 and 6.1. One joint, or
+# three, or a limb that is lost 4.9, 7.9 and 10.8 with `small`, 8.8, 13.9 and 16.5 with `cae` (bench every).
 # `small-open` stands in where only weights for any use are installed, or asked for.
-AMID = JOINTS = ("small", "cae", "small-open")
-KEYS = ("cmib", "small", "small-open")
+NETWORKS, KEYS = ("small", "cae", "small-open"), ("small", "cmib", "small-open")
 
 
 def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
     """The method that measured best on validation performers for gaps of this length.
 
-    A network from its length on, unless it refuses: then the next best one; joints that are missing on
-    their own go to networks as well. Where both sides (`lone` is 2) are single keys nothing tells how fast
-    anything moves: there the network that was made for keys is better. The spline else, and where no weights
-    are installed; then with the reason why no network fills a gap that would be its own.
+    A network from its length on, unless it refuses: then the next best one. Joints that are missing on their
+    own go to networks at any length, as do gaps between two single keys (`lone` is 2), as nothing tells how
+    fast anything moves there. The spline else, and where no weights are installed; then with the reason why
+    no network fills a gap that would be its own.
     """
     why, short = None, False
-    for name in _candidates(gap, lone):
+    for name in KEYS if gap.joints is None and lone == 2 else NETWORKS:
         try:
             card = weights.find(name)
         except RequestError as error:
@@ -45,10 +43,3 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
             return network, None
         why = why or f"not filled by {name}: {reason}"
     return registry.get("spline"), None if short else why
-
-
-def _candidates(gap: Gap, lone: int) -> tuple[str, ...]:
-    """The networks for a gap, the best one first."""
-    if gap.joints is not None:
-        return JOINTS
-    return KEYS if lone == 2 else AMID
