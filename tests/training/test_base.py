@@ -166,6 +166,16 @@ def test_packs_by_name(walk_pack):
         chosen(packs, "bandai")
 
 
+def test_clips_that_are_shorter_than_gaps_may_be(walk_pack, drawn, tmp_path):
+    """As a user's own may all be: gaps are drawn that fit into them."""
+    pack = walk_pack("lafan1", both=True)
+    long_ones = BaseSettings(width=24, layers=1, batch=2, longest=2000, short=-8.0)
+    train_base([pack], tmp_path, Budget.parse("2steps"), long_ones, say=lambda line: None)
+    poses = Poses([pack], ("train",), ("",), 40, torch.device("cpu"))
+    with pytest.raises(RequestError, match="no clip is long enough to learn from 2000 frames"):
+        poses.draw(np.random.default_rng(0), 2, 2000)
+
+
 @pytest.fixture(scope="module")
 def trained(walk_pack, tmp_path_factory):  # type: ignore[no-untyped-def]
     """The card of a network that was trained for a moment, and what was said meanwhile."""

@@ -158,7 +158,7 @@ def own(
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
     asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
     # Gently: what it knows of all motion is to stay.
-    gentle = BaseSettings(config=begin.training["config"], learning_rate=2e-4, every_seconds=60.0)
+    gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0)
     settings = change(gentle, set)
     pack = own_pack(data, JUDGED, say)
     held = pack.splits == "validation"
@@ -186,7 +186,7 @@ def own(
     say_table(("gap", "before", "after"), rows, right=("before", "after"))
     say("mean error of joints in the part held out, cm on a body with a leg of 0.86 m")
     if after["gap30"] >= before["gap30"]:
-        say("It is no better: more takes, or a smaller --set learning_rate=5e-5, may help.")
+        say("It is no better: more takes, or a smaller --set learning_rate=2e-4, may help.")
     say()
     say(f"wrote {out}: interpose fill TAKE.bvh --method {out}")
 

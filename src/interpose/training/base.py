@@ -291,6 +291,9 @@ def train_base(
     if start:
         restore(model, start.onnx)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
+    # Where all clips are short, as a user's own may be, gaps are drawn no longer than fit into them.
+    fit = max(1, min(settings.longest, int(poses.counts.max()) - 2 * settings.context))
+    drawing = replace(settings, longest=fit)
 
     def wrong(
         given: Motion,
@@ -308,7 +311,7 @@ def train_base(
         return losses(model.answer(start, said, given.local, known), truth, placed, known, bones)
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
-        drawn, task = draw_batch(rng, poses, settings, batch)
+        drawn, task = draw_batch(rng, poses, drawing, batch)
         known, pins, noisy = (torch.from_numpy(x).to(device) for x in (task.known, task.pins, task.noisy))
         truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
         given = spoil(truth, noisy, settings.noise, int(rng.integers(2**31)))

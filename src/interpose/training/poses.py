@@ -111,8 +111,17 @@ class Poses:
         return Batch(turned, self.root[index], self.bones[chosen], self.label[chosen])
 
     def draw(self, rng: np.random.Generator, batch: int, length: int, mirror: bool = True) -> Batch:
-        """A random batch, half of it mirrored left to right unless said otherwise."""
+        """A random batch, half of it mirrored left to right unless said otherwise.
+
+        Raises RequestError where no clip has `length` frames.
+        """
         weight = np.maximum(self.counts - length + 1, 0)
+        if not weight.any():
+            raise RequestError(
+                f"no clip is long enough to learn from {length} frames",
+                f"the longest one has {self.counts.max()} at 30 fps",
+                "Give longer clips.",
+            )
         clip = rng.choice(len(weight), batch, p=weight / weight.sum())
         drawn = self.at(clip, (rng.random(batch) * weight[clip]).astype(int), length)
         if not mirror:
