@@ -158,6 +158,12 @@ def test_every_task_is_drawn_and_leaves_something_to_go_by():
     assert set(TASKS) == {"all", "gap"}
 
 
+def test_a_width_that_heads_do_not_share(walk_pack):
+    with pytest.raises(RequestError, match="cannot be 256 wide") as error:
+        BaseSettings(width=256).network(("",))
+    assert "width=258" in error.value.fix
+
+
 def test_packs_by_name(walk_pack):
     packs = [walk_pack("lafan1"), walk_pack("cmu")]
     assert chosen(packs, "cmu") == packs[1:]

@@ -99,6 +99,12 @@ class BaseSettings(Settings):
 
     def network(self, labels: tuple[str, ...]) -> BaseConfig:
         base = CONFIGS[self.config]
+        if self.width % base.heads:
+            raise RequestError(
+                f"a network cannot be {self.width} wide",
+                f"its {base.heads} heads share the width evenly",
+                f"Write --set width={base.heads * max(1, round(self.width / base.heads))}.",
+            )
         return replace(
             base,
             labels=labels,
