@@ -66,6 +66,13 @@ def test_a_command_line_asks_for_itself_alone(walk, tmp_path, capsys):
     assert "small-open" not in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("verb", ["fill", "between", "stitch", "recover", "denoise", "forecast"])
+def test_every_verb_that_generates_explains_it(verb, capsys):
+    main([verb, "--help"])
+    said = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "open to use only weights that may be used for anything" in said
+
+
 def test_without_weights_for_research(walk, monkeypatch, tmp_path):
     """As with the wheel alone: open weights, inside of the package, stand in."""
     inside = tmp_path / "inside"

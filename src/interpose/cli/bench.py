@@ -375,7 +375,7 @@ def recipes(
       interpose train cae --out runs/l1 --budget 1200steps
       interpose train cae --out runs/l2 --budget 1200steps --set loss=l2
       interpose bench recipes runs/l1 runs/l2
-      interpose bench recipes studies/base/* --figures ratio5,ratio15,ratio30,ratio45
+      interpose bench recipes studies/base/full studies/base/no-* --figures ratio15,ratio30
 
     Args:
         runs: folders that interpose train wrote; the first is what the others are compared with.

@@ -90,7 +90,7 @@ def _exported(path: Path) -> dict[str, Tensor]:
 
 
 def restore(model: nn.Module, path: Path) -> None:
-    """Fill a model with the weights of an exported graph (16 bits of them, where they are large).
+    """Fill a model with the weights of an exported graph (16 bits of them).
 
     A part that begins with nothing may be missing: without it the network is the one that was exported.
     """
