@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 from array_api_compat import array_namespace
 
+from interpose.geometry.constant import Constant
+
 Array = Any
-Table = tuple[np.ndarray, np.ndarray, np.ndarray]
+Table = tuple[Constant, Constant, Constant]
 ROWS = 4096
 
 
@@ -32,21 +34,12 @@ def table(a: str, b: str, *sums: str) -> Table:
     for column, terms in enumerate(sums):
         for sign, pair in re.findall(r"([+-]?)(\w\w)", terms):
             out[pairs.index(pair), column] += -1.0 if sign == "-" else 1.0
-    return left, right, out
-
-
-def constant(values: np.ndarray, like: Array) -> Array:
-    """`values` as an array beside `like`: of the same library and device; what is float, as precise."""
-    if isinstance(like, np.ndarray):
-        return values.astype(like.dtype) if values.dtype.kind == "f" else values
-    xp = array_namespace(like)
-    kind = like.dtype if values.dtype.kind == "f" else getattr(xp, values.dtype.name)
-    return xp.asarray(values, dtype=kind, device=like.device)
+    return Constant(left), Constant(right), Constant(out)
 
 
 def bilinear(a: Array, b: Array, sums: Table) -> Array:
     """Sums of products (..., k) of vectors (..., n) and (..., m), which broadcast."""
-    left, right, out = (constant(matrix, a) for matrix in sums)
+    left, right, out = (matrix.beside(a) for matrix in sums)
     if not isinstance(a, np.ndarray):
         xp = array_namespace(a, b)
         return xp.matmul(xp.matmul(a, left) * xp.matmul(b, right), out)

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from array_api_compat import array_namespace
 
 from interpose.geometry import rotations
-from interpose.geometry.bilinear import constant
+from interpose.geometry.constant import Constant
 
 Array = Any
 
@@ -28,17 +27,28 @@ class _Plan:
         ancestors: (J, J) 1 where the column is the row's joint or stands above it, else 0.
     """
 
-    levels: tuple[np.ndarray, ...]
-    above: tuple[np.ndarray, ...]
-    order: np.ndarray
-    parents: np.ndarray
-    roots: np.ndarray
-    others: np.ndarray
-    ancestors: np.ndarray
+    levels: tuple[Constant, ...]
+    above: tuple[Constant, ...]
+    order: Constant
+    parents: Constant
+    roots: Constant
+    others: Constant
+    ancestors: Constant
 
 
-@lru_cache(maxsize=64)
+_plans: dict[tuple[int, ...], _Plan] = {}
+
+
 def _plan(parents: tuple[int, ...]) -> _Plan:
+    """Made once for each skeleton: torch.compile looks right through the caches of functools."""
+    if parents not in _plans:
+        if len(_plans) == 64:
+            _plans.clear()
+        _plans[parents] = _make_plan(parents)
+    return _plans[parents]
+
+
+def _make_plan(parents: tuple[int, ...]) -> _Plan:
     depth = [0] * len(parents)
     ancestors = np.eye(len(parents))
     for joint, parent in enumerate(parents):
@@ -49,17 +59,17 @@ def _plan(parents: tuple[int, ...]) -> _Plan:
     above = [[before.index(parents[j]) for j in level] for before, level in zip(levels, levels[1:])]
     roots = (np.array(parents)[:, None] < 0).astype(float)
     return _Plan(
-        levels=tuple(map(np.array, levels)),
-        above=tuple(map(np.array, above)),
-        order=np.argsort([j for level in levels for j in level]),
-        parents=np.maximum(parents, 0),
-        roots=roots,
-        others=1 - roots,
-        ancestors=ancestors,
+        levels=tuple(map(Constant, levels)),
+        above=tuple(map(Constant, above)),
+        order=Constant(np.argsort([j for level in levels for j in level])),
+        parents=Constant(np.maximum(parents, 0)),
+        roots=Constant(roots),
+        others=Constant(1 - roots),
+        ancestors=Constant(ancestors),
     )
 
 
-def ancestors(parents: tuple[int, ...]) -> np.ndarray:
+def ancestors(parents: tuple[int, ...]) -> Constant:
     """A matrix (J, J): 1 where the column is the row's joint or stands above it, else 0."""
     return _plan(parents).ancestors
 
@@ -81,7 +91,7 @@ def local_rotations(globals_: Array, parents: tuple[int, ...]) -> Array:
     plan = _plan(parents)
     turned = rotations.multiply(rotations.conjugate(_take(globals_, plan.parents)), globals_)
     # Sums with masks: in graphs a choice is slow.
-    return constant(plan.roots, globals_) * globals_ + constant(plan.others, globals_) * turned
+    return plan.roots.beside(globals_) * globals_ + plan.others.beside(globals_) * turned
 
 
 def forward(local: Array, translation: Array, parents: tuple[int, ...]) -> tuple[Array, Array]:
@@ -100,10 +110,10 @@ def forward(local: Array, translation: Array, parents: tuple[int, ...]) -> tuple
     turned = global_rotations(local, parents)
     translation = xp.broadcast_to(translation, (*local.shape[:-1], 3))
     bones = rotations.rotate(_take(turned, plan.parents), translation)
-    bones = constant(plan.roots, local) * translation + constant(plan.others, local) * bones
-    return turned, xp.matmul(constant(plan.ancestors, local), bones)
+    bones = plan.roots.beside(local) * translation + plan.others.beside(local) * bones
+    return turned, xp.matmul(plan.ancestors.beside(local), bones)
 
 
-def _take(values: Array, joints: np.ndarray) -> Array:
+def _take(values: Array, joints: Constant) -> Array:
     """Some joints of (..., J, n)."""
-    return array_namespace(values).take(values, constant(joints, values), axis=-2)
+    return array_namespace(values).take(values, joints.beside(values), axis=-2)

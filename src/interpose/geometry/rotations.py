@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from array_api_compat import array_namespace
 
-from interpose.geometry.bilinear import bilinear, constant, table
+from interpose.geometry.bilinear import bilinear, table
+from interpose.geometry.constant import Constant
 
 Array = Any
 AXES = "XYZ"
@@ -39,6 +40,7 @@ TIMES = table(
     "wc-wg+xb+xd+yo-ya+ye-yi+zf+zh",
     "wd-wb+xc+xg+yf+yh+zo-za-ze+zi",
 )
+COMPONENTS = Constant(np.arange(4))
 
 
 def identity(*shape: int, like: Array = None) -> Array:
@@ -148,7 +150,7 @@ def from_matrix(m: Array) -> Array:
     rows = xp.reshape(m, (*m.shape[:-2], 9))
     one = xp.ones_like(rows[..., :1])
     squares = bilinear(xp.concat([one, rows[..., ::4]], axis=-1), one, SQUARES)
-    best = xp.argmax(squares, axis=-1)[..., None] == constant(np.arange(4), m)
+    best = xp.argmax(squares, axis=-1)[..., None] == COMPONENTS.beside(m)
     q = normalize(bilinear(xp.astype(best, m.dtype), xp.concat([one, rows], axis=-1), TIMES))
     return q * xp.where(q[..., :1] < 0, -one, one)
 

@@ -18,6 +18,7 @@ import torch
 from torch import Tensor, nn
 
 from interpose.geometry import kinematics, rotations
+from interpose.geometry.constant import Constant
 from interpose.geometry.ground import turn
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
@@ -32,6 +33,9 @@ VELOCITY = 10.0  # what velocities (m or matrix entries a frame) are multiplied 
 # and great arcs in gaps of 5, 15, 30 and 45 frames: what a network says that has learned nothing, by
 # `interpose train base --out runs/begin --set datasets=lafan1 --budget 1steps`.
 REACH_TURN, REACH_WAY = 20.0, 45.0
+REACH = Constant([REACH_TURN] * COUNT + [REACH_WAY])
+REST = Constant([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # columns of a joint that stands as in the T-pose
+FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
 # Numbers of a frame that the network sees: columns of rotations, hips, joints around them, how both move,
 # what is known, pins and whether there are any, and how near known frames are.
 SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
@@ -252,15 +256,14 @@ class Base(nn.Module):
         columns = torch.cat([rotations.to_6d(local), nn.functional.pad(root, (0, 3))[:, :, None]], dim=2)
         columns = held.to(columns.dtype)[..., None] * columns
         flat = columns.transpose(1, 2).flatten(0, 1)
-        reach = flat.new_tensor([REACH_TURN] * COUNT + [REACH_WAY]).repeat(batch)[:, None, None]
+        reach = REACH.beside(flat).repeat(batch)[:, None, None]
         done = complete_columns(
             flat, held.transpose(1, 2).flatten(0, 1), reach if self.config.velocities else None
         )
         done = done.unflatten(0, (batch, COUNT + 1)).transpose(1, 2)
         # Joints that are never known stand as in the T-pose.
         never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
-        rest = done.new_tensor([1.0, 0, 0, 0, 1.0, 0])
-        turned = rotations.from_6d(torch.where(never, rest, done[:, :, :COUNT]))
+        turned = rotations.from_6d(torch.where(never, REST.beside(done), done[:, :, :COUNT]))
         turned = mixed(held[:, :, :COUNT], local, turned)
         motion = Motion(turned, done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
@@ -272,7 +275,7 @@ class Base(nn.Module):
         else:
             at = torch.zeros(batch, 1, dtype=torch.long, device=held.device)
         pose = pick(placed.flatten(2), at).unflatten(2, (COUNT, 3))[:, 0]
-        origin = pose[:, 0] * pose.new_tensor([1.0, 0.0, 1.0])
+        origin = pose[:, 0] * FLOOR.beside(pose)
         return Start(motion, globals_, placed, origin, facing(pose))
 
     def features(self, start: Start, known: Tensor, pinned: Tensor, pins: Tensor) -> Tensor:
@@ -332,13 +335,13 @@ class Base(nn.Module):
             flat = room(known.transpose(1, 2).flatten(0, 1))
             open_ = flat.unflatten(0, (known.shape[0], -1)).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
-        above = open_.new_tensor(kinematics.ancestors(PARENTS))
+        above = kinematics.ancestors(PARENTS).beside(open_)
         share = (above * open_[..., None, :COUNT]).amax(dim=-1)[..., None]
         ahead = rotations.about("Y", -start.yaw)[:, None, None]
         begin = rotations.to_6d(rotations.multiply(ahead, start.turned))
         columns = columns.unflatten(2, (COUNT, 6))
         if not config.residual:
-            columns = columns + columns.new_tensor([1.0, 0, 0, 0, 1.0, 0]) - begin
+            columns = columns + REST.beside(columns) - begin
         turned = rotations.from_6d(begin + share * columns)
         turned = rotations.multiply(rotations.conjugate(ahead), turned)
         turned = kinematics.local_rotations(turned, PARENTS)

@@ -13,6 +13,7 @@ from torch import Tensor, nn
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.geometry import rotations
+from interpose.geometry.constant import Constant
 from interpose.geometry.ground import turn
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
@@ -20,6 +21,8 @@ from interpose.skeletons.body import facing
 
 POSITIONS = 3 * len(JOINTS)
 
+NO_TURN = Constant([1.0, 0.0, 0.0, 0.0])
+FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
 PLACE = 0.3  # deviation of learned positions at first: of about the size of the numbers of a frame
 
 
@@ -107,7 +110,7 @@ class Encoder(nn.Module):
         deep = torch.cat([token, seen + self._places(keys)], dim=1)
         # PyTorch's fused attention takes several times as long backwards on a CPU.
         with sdpa_kernel(SDPBackend.MATH):
-            deep = self.layers(deep, mask=self._bias(keys))
+            deep = self.layers(deep, mask=self._bias(keys), is_causal=False)
         said = self.last(deep[:, 1:])
         return deep[:, 0], frames + self.std * said if self.residual else said
 
@@ -186,13 +189,13 @@ class Cmib(nn.Module):
         The first key faces X, as in LAFAN1's protocol; the origin is halfway between first and last key.
         """
         positions = torch.where(keys[..., None, None], positions, 0.0)
-        rotation = torch.where(keys[..., None, None], rotation, rotation.new_tensor([1.0, 0, 0, 0]))
+        rotation = torch.where(keys[..., None, None], rotation, NO_TURN.beside(rotation))
         frame = torch.arange(keys.shape[1], device=keys.device).expand_as(keys)
         start = torch.where(keys, frame, keys.shape[1]).amin(dim=1, keepdim=True)
         target = torch.where(keys, frame, -1).amax(dim=1, keepdim=True)
         start, target = start.clamp(max=keys.shape[1] - 1), target.clamp(min=0)
         hips = positions[:, :, 0]
-        origin = 0.5 * (pick(hips, start) + pick(hips, target))[:, 0] * positions.new_tensor([1.0, 0, 1.0])
+        origin = 0.5 * (pick(hips, start) + pick(hips, target))[:, 0] * FLOOR.beside(positions)
         first = pick(positions.flatten(2), start).unflatten(2, (len(JOINTS), 3))[:, 0]
         yaw = facing(first) - torch.pi / 2
         positions = turn(positions - origin[:, None, None], -yaw[:, None, None])

@@ -14,6 +14,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from interpose.geometry.constant import Constant
 from interpose.geometry.ground import turn
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS
@@ -22,6 +23,7 @@ from interpose.skeletons.body import PAIRS, facing
 VALUES = 3 * len(JOINTS)
 BRANCHES = ("base", "edm", "motion")
 ENDS = tuple(itertools.combinations(range(len(JOINTS)), 2))  # pairs of joints whose distance is looked at
+FIRST, SECOND = (Constant(side) for side in zip(*ENDS))
 
 
 @dataclass(frozen=True)
@@ -299,7 +301,7 @@ class Generator(nn.Module):
 
 def distances(motion: Tensor) -> Tensor:
     """(B, T, P) metres between the joints (B, T, 22, 3) of each of the pairs ENDS: a distance matrix."""
-    a, b = (torch.tensor(side, device=motion.device) for side in zip(*ENDS))
+    a, b = FIRST.beside(motion), SECOND.beside(motion)
     # The root of nothing has no gradient.
     return ((motion[:, :, a] - motion[:, :, b]).square().sum(dim=-1) + 1e-8).sqrt()
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -19,12 +20,14 @@ from torch.nn import functional
 from interpose.datasets import Pack
 from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics, rotations
+from interpose.geometry.constant import Constant
 from interpose.methods.weights import Card
 from interpose.models.base import CONFIGS, COUNT, FEET, Answer, Base, BaseConfig, Motion
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
-from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.device import fused, pick_device, processes, send
+from interpose.training.loop import Settings, Trainer, restore
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -35,6 +38,7 @@ SHORTEST = 30  # frames; clips that are shorter are left out
 JUDGED = 10 + 45 + 1  # frames of a window that is validated: known ones, the longest gap, and one more
 # A foot stands that moves by less than this in a frame, in metres (.15 m a second).
 STANDS = 0.005
+STANDING = Constant(FEET)
 # How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
 TASKS: dict[str, dict[str, float]] = {
     "all": {
@@ -196,7 +200,7 @@ def draw_batch(
     """Motions, and what is asked of each."""
     task = draw_task(rng, settings, batch)
     drawn = poses.draw(rng, batch, task.known.shape[1], mirror=bool(settings.mirror))
-    unsaid = torch.from_numpy(rng.random(batch) >= settings.labelled).to(poses.device)
+    unsaid = send(rng.random(batch) >= settings.labelled, poses.device)
     drawn.label = torch.where(unsaid, 0, drawn.label)
     return drawn, task
 
@@ -204,8 +208,6 @@ def draw_batch(
 def spoil(motion: Motion, noisy: Tensor, worst: float, seed: int) -> Motion:
     """Motions with noise of up to `worst` metres, and radians, in those that are `noisy` (B,)."""
     local, root = motion.local, motion.root
-    if not noisy.any():
-        return motion
     generator = torch.Generator(root.device).manual_seed(seed)
     drawn = torch.rand(len(root), 1, 1, device=root.device, generator=generator)
     size = worst * drawn * noisy[:, None, None]
@@ -221,10 +223,9 @@ class Losses:
         self.settings = settings
 
     def parts(
-        self, answer: Answer, truth: Motion, placed: Tensor, known: Tensor, bones: Tensor
+        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor
     ) -> dict[str, Tensor]:
         turned, said = answer.motion.forward(bones)
-        true_turned = truth.forward(bones)[0]
         # Frames in which something is missing; each motion counts the same, however long its gap is.
         missing = (known < 1).any(dim=2).to(said.dtype)
         share = missing / missing.sum(dim=1, keepdim=True).clamp(min=1)
@@ -233,11 +234,12 @@ class Losses:
             return (values * share).sum(dim=1).mean()
 
         off = (said - placed).norm(dim=-1)
-        columns = rotations.to_6d(turned) - rotations.to_6d(true_turned)
+        columns = rotations.to_6d(turned) - rotations.to_6d(rotation)
         step, true_step = said.diff(dim=1), placed.diff(dim=1)
         moved = functional.pad((step - true_step).abs().mean(dim=(2, 3)), (1, 0))
-        stands = (true_step[:, :, FEET].norm(dim=-1) < STANDS).to(said.dtype)
-        slid = functional.pad((step[:, :, FEET].norm(dim=-1) * stands).mean(dim=2), (1, 0))
+        feet = STANDING.beside(step)
+        stands = (true_step[:, :, feet].norm(dim=-1) < STANDS).to(said.dtype)
+        slid = functional.pad((step[:, :, feet].norm(dim=-1) * stands).mean(dim=2), (1, 0))
         contact = functional.binary_cross_entropy_with_logits(
             answer.contact[:, 1:], stands, reduction="none"
         ).mean(dim=2)
@@ -252,8 +254,10 @@ class Losses:
             "risk": mean(answer.risk + 100 * error * torch.exp(-answer.risk)),
         }
 
-    def __call__(self, answer: Answer, truth: Motion, placed: Tensor, known: Tensor, bones: Tensor) -> Tensor:
-        parts = self.parts(answer, truth, placed, known, bones)
+    def __call__(
+        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor
+    ) -> Tensor:
+        parts = self.parts(answer, rotation, placed, known, bones)
         return torch.stack([getattr(self.settings, name) * part for name, part in parts.items()]).sum()
 
 
@@ -301,27 +305,32 @@ def train_base(
     fit = max(1, min(settings.longest, int(poses.counts.max()) - 2 * settings.context))
     drawing = replace(settings, longest=fit)
 
+    @partial(fused, device, 6)
     def wrong(
-        given: Motion,
-        truth: Motion,
+        local: Tensor,
+        root: Tensor,
+        rotation: Tensor,
         placed: Tensor,
         known: Tensor,
         pins: Tensor,
         label: Tensor,
         bones: Tensor,
     ) -> Tensor:
-        start = model.start(given.local, given.root, known, bones)
+        start = model.start(local, root, known, bones)
         seen = model.features(start, known, placed, pins)
         with torch.autocast(device.type, torch.bfloat16):
             said = model.encoder(seen, label, bones)
-        return losses(model.answer(start, said, given.local, known), truth, placed, known, bones)
+        return losses(model.answer(start, said, local, known), rotation, placed, known, bones)
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         drawn, task = draw_batch(rng, poses, drawing, batch)
-        known, pins, noisy = (torch.from_numpy(x).to(device) for x in (task.known, task.pins, task.noisy))
-        truth = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
-        given = spoil(truth, noisy, settings.noise, int(rng.integers(2**31)))
-        return wrong(given, truth, drawn.positions(), known, pins, drawn.label, drawn.bones)
+        known, pins = (send(x, device) for x in (task.known, task.pins))
+        given = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
+        seed = int(rng.integers(2**31))
+        if task.noisy.any():
+            given = spoil(given, send(task.noisy, device), settings.noise, seed)
+        about = (drawn.rotation, drawn.positions(), known, pins, drawn.label, drawn.bones)
+        return wrong(given.local, given.root, *about)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
         if settings.muon:

@@ -36,7 +36,8 @@ from interpose.observation.corruption import gap_mask, gaussian_noise, joints_ma
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
-from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.device import pick_device, processes, send
+from interpose.training.loop import Settings, Trainer, restore
 from interpose.training.windows import Windows
 
 NETWORKS: dict[str, Callable[[], Infiller]] = {
@@ -218,10 +219,10 @@ def train_cae(
         if settings.noise:
             chosen, *disturbance = disturb(rng, settings, batch)
             observed[chosen] = True
-        image = to_image(positions, torch.from_numpy(observed).to(device))
+        image = to_image(positions, send(observed, device))
         with torch.autocast(device.type, torch.bfloat16):
             if settings.noise:
-                noise, kept = (torch.from_numpy(one).to(device) for one in disturbance)
+                noise, kept = (send(one, device) for one in disturbance)
                 answer = predict_disturbed(model, image, noise, kept)
             else:
                 answer = model.predict(image)

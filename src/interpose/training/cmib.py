@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,9 @@ from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
-from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.device import fused, pick_device, processes, send
+from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
 
 
@@ -40,6 +43,7 @@ class CmibSettings(Settings):
     representation: str = "quaternion"  # table 1; also "axis-angle" and "euler"
     decay: float = 0.01
     betas: tuple[float, float] = (0.9, 0.99)
+    muon: int = 0  # whether Muon moves the matrices of the layers; else AdamW moves all, as in the paper
 
 
 def draw_length(rng: np.random.Generator, settings: CmibSettings) -> int:
@@ -64,7 +68,7 @@ def sample_frames(model: Cmib, poses: Poses, settings: CmibSettings) -> Tensor:
     rng, seen = np.random.default_rng(settings.seed), []
     for _ in range(20):
         drawn = poses.draw(rng, 32, draw_length(rng, settings))
-        keys = torch.from_numpy(draw_keys(rng, settings, *drawn.rotation.shape[:2])).to(poses.device)
+        keys = send(draw_keys(rng, settings, *drawn.rotation.shape[:2]), poses.device)
         seen.append(model.prepare(drawn.positions(), drawn.rotation, keys)[0].flatten(0, 1))
     return torch.cat(seen)
 
@@ -133,17 +137,24 @@ def train_cmib(
     moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)
     batch = max(1, settings.batch // processes())
 
+    @partial(fused, device, 3)
+    def wrong(rotation: Tensor, root: Tensor, keys: Tensor, bones: Tensor, label: Tensor) -> Tensor:
+        return losses(Batch(rotation, root, bones, label), keys)
+
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         length = draw_length(rng, settings)
         drawn = poses.draw(rng, batch, length)
         walks = moving[drawn.label].cpu().numpy() & (rng.random(batch) < settings.augmented)
         drawn = new_path(rng, drawn, walks)
-        unsaid = torch.from_numpy(rng.random(batch) >= settings.labelled).to(device)
+        unsaid = send(rng.random(batch) >= settings.labelled, device)
         drawn.label = torch.where(unsaid, 0, drawn.label)
-        keys = torch.from_numpy(draw_keys(rng, settings, batch, length)).to(device)
-        return losses(drawn, keys)
+        keys = send(draw_keys(rng, settings, batch, length), device)
+        return wrong(drawn.rotation, drawn.root, keys, drawn.bones, drawn.label)
 
-    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer:
+    def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
+        if settings.muon:
+            named = list(model.named_parameters())
+            return Muon(named, "encoder.layers.", settings.learning_rate, settings.decay)
         return torch.optim.AdamW(
             parameters, settings.learning_rate, settings.betas, weight_decay=settings.decay, fused=True
         )

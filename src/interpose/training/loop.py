@@ -7,7 +7,9 @@ import json
 import math
 import os
 import pickle
+import signal
 import subprocess
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -23,23 +25,8 @@ from torch import distributed as dist
 from interpose.errors import FileError
 from interpose.methods.weights import Card
 from interpose.training.budget import Budget
+from interpose.training.device import processes, rank
 from interpose.training.optimizers import Muon
-
-
-def pick_device() -> torch.device:
-    """The GPU of this process when there is one, else the CPU. Under torchrun, also joins the group."""
-    gpu = torch.cuda.is_available()
-    if int(os.environ.get("WORLD_SIZE", "1")) > 1 and not dist.is_initialized():
-        dist.init_process_group("nccl" if gpu else "gloo")
-    return torch.device("cuda", int(os.environ.get("LOCAL_RANK", "0"))) if gpu else torch.device("cpu")
-
-
-def processes() -> int:
-    return dist.get_world_size() if dist.is_initialized() else 1
-
-
-def rank() -> int:
-    return dist.get_rank() if dist.is_initialized() else 0
 
 
 @dataclass
@@ -123,6 +110,27 @@ class Opponent:
     loss: Callable[[np.random.Generator, float], Tensor]
     optimizer: torch.optim.Optimizer
     pace: float = 1.0
+
+
+class Stop:
+    """Whether somebody asked to stop: SIGINT or SIGTERM. Once more, and the default happens."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._before: dict[int, Any] = {}
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                if signal.getsignal(number) is not signal.SIG_IGN:
+                    self._before[number] = signal.signal(number, self._ask)
+
+    def _ask(self, number: int, _: Any) -> None:
+        self.asked = True
+        self.over()
+
+    def over(self) -> None:
+        """Listen no more."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
 
 def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
@@ -249,7 +257,10 @@ class Trainer:
         return float(flat[0])
 
     def run(self) -> nn.Module:
-        """Train until the budget is spent; the averaged model comes back."""
+        """Train until the budget is spent; the averaged model comes back.
+
+        Asked to stop, by Ctrl-C or a signal to terminate, it ends the step and saves; KeyboardInterrupt.
+        """
         if rank() == 0:
             kept = {
                 **asdict(self.settings),
@@ -263,7 +274,8 @@ class Trainer:
         told = time.monotonic() - self.settings.every_seconds * 0.8
         losses: list[Tensor] = []
         against: list[Tensor] = []
-        while self.budget.fraction < 1:
+        stop = Stop()
+        while self.budget.fraction < 1 and not stop.asked:
             opponents = [self.opponent] if self.opponent else []
             paces = [(self.optimizer, 1.0), *((one.optimizer, one.pace) for one in opponents)]
             for optimizer, pace in paces:
@@ -289,15 +301,19 @@ class Trainer:
                 keep = min(
                     self.settings.average, (1 + self.budget.spent_steps) / (10 + self.budget.spent_steps)
                 )
-                for mean, now in zip(self.averaged.parameters(), self.model.parameters()):
-                    mean.lerp_(now, 1 - keep)
-                for mean, now in zip(self.averaged.buffers(), self.model.buffers()):
-                    mean.copy_(now)
-            due = time.monotonic() - told > self.settings.every_seconds or self.budget.fraction >= 1
+                means, now = list(self.averaged.parameters()), list(self.model.parameters())
+                torch._foreach_lerp_(means, now, 1 - keep)
+                for held, new in zip(self.averaged.buffers(), self.model.buffers()):
+                    held.copy_(new)
+            ends = self.budget.fraction >= 1 or stop.asked
+            due = time.monotonic() - told > self.settings.every_seconds or ends
             if due and rank() == 0:
                 said = {"loss": losses, **({"opponent": against} if against else {})}
                 self._tell({name: round(float(torch.stack(some).mean()), 5) for name, some in said.items()})
                 told, losses, against = time.monotonic(), [], []
+        stop.over()
+        if stop.asked:
+            raise KeyboardInterrupt
         if dist.is_initialized():
             dist.barrier()
         return self.averaged

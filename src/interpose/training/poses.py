@@ -18,8 +18,13 @@ from interpose.datasets import Pack
 from interpose.datasets.pack import STEP
 from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
+from interpose.geometry.constant import Constant
 from interpose.geometry.ground import turn
 from interpose.skeletons import PARENTS, SIDES
+from interpose.training.device import send
+from interpose.training.windows import MIRROR
+
+MIRROR_TURN = Constant([1.0, 1.0, -1.0, -1.0])  # of quaternions
 
 
 @dataclass
@@ -103,11 +108,11 @@ class Poses:
 
     def at(self, clip: np.ndarray, first: np.ndarray, length: int) -> Batch:
         """Windows of the given clips from the given frames on."""
-        index = torch.from_numpy((self.starts[clip] + first)[:, None] + np.arange(length)).to(self.device)
+        index = send((self.starts[clip] + first)[:, None] + np.arange(length), self.device)
         turned = rotations.exp(self.turned[index].to(torch.float32) * STEP)
         # Rotation vectors jump where they pass half a turn; the rotations that they mean do not.
         turned = rotations.continuous(turned.transpose(0, 1)).transpose(0, 1)
-        chosen = torch.from_numpy(clip).to(self.device)
+        chosen = send(clip, self.device)
         return Batch(turned, self.root[index], self.bones[chosen], self.label[chosen])
 
     def draw(self, rng: np.random.Generator, batch: int, length: int, mirror: bool = True) -> Batch:
@@ -126,9 +131,9 @@ class Poses:
         drawn = self.at(clip, (rng.random(batch) * weight[clip]).astype(int), length)
         if not mirror:
             return drawn
-        flip = torch.from_numpy(rng.random(batch) < 0.5).to(self.device)[:, None, None]
-        mirrored = drawn.rotation[:, :, self.sides] * drawn.rotation.new_tensor([1.0, 1, -1, -1])
-        side = drawn.root.new_tensor([-1.0, 1, 1])
+        flip = send(rng.random(batch) < 0.5, self.device)[:, None, None]
+        mirrored = drawn.rotation[:, :, self.sides] * MIRROR_TURN.beside(drawn.rotation)
+        side = MIRROR.beside(drawn.root)
         return Batch(
             torch.where(flip[..., None], mirrored, drawn.rotation),
             torch.where(flip, drawn.root * side, drawn.root),
@@ -176,18 +181,19 @@ def random_path(
 
 def new_path(rng: np.random.Generator, batch: Batch, which: np.ndarray) -> Batch:
     """The windows `which` (B,) walk another way between the same two points, turned along it."""
-    rotation, root = batch.rotation.clone(), batch.root.clone()
+    # All at once: on a GPU each way that is asked for would wait.
+    ways = batch.root.cpu().numpy().astype(float)
+    moved, turned = ways.copy(), np.zeros(ways.shape[:2])
     for i in np.flatnonzero(which):
-        way = batch.root[i].cpu().numpy().astype(float)
-        line = way[-1] - way[0]
+        line = ways[i, -1] - ways[i, 0]
         yaw = np.arctan2(line[0], line[2])
-        flat = turn(way, np.array(-yaw))  # the line lies along Z now
+        flat = turn(ways[i], np.array(-yaw))  # the line lies along Z now
         across = random_path(rng, flat[:, 2], flat[:, 0])
         if across is None:
             continue
-        headings = [np.arctan2(np.gradient(a), np.gradient(flat[:, 2])) for a in (flat[:, 0], across)]
-        change = torch.from_numpy(headings[1] - headings[0]).to(root)
-        there = turn(np.stack([across, flat[:, 1], flat[:, 2]], axis=-1), np.array(yaw))
-        root[i] = torch.from_numpy(there).to(root)
-        rotation[i] = rotations.multiply(rotations.about("Y", change)[:, None], batch.rotation[i])
+        before, after = (np.arctan2(np.gradient(a), np.gradient(flat[:, 2])) for a in (flat[:, 0], across))
+        turned[i] = after - before
+        moved[i] = turn(np.stack([across, flat[:, 1], flat[:, 2]], axis=-1), np.array(yaw))
+    change, root = (send(some.astype(np.float32), batch.root.device) for some in (turned, moved))
+    rotation = rotations.multiply(rotations.about("Y", change)[:, :, None], batch.rotation)
     return Batch(rotation, root, batch.bones, batch.label)

@@ -21,7 +21,8 @@ from interpose.methods.weights import Card
 from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig, from_values, to_values
 from interpose.skeletons import PARENTS
 from interpose.training.budget import Budget
-from interpose.training.loop import Settings, Trainer, pick_device, processes, restore
+from interpose.training.device import pick_device, processes
+from interpose.training.loop import Settings, Trainer, restore
 from interpose.training.poses import Batch, Poses, labels_of
 from interpose.training.stmi_gan import DATASETS
 

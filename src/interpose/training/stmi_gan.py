@@ -25,12 +25,15 @@ from torch.nn import functional
 from interpose.datasets import Pack
 from interpose.errors import RequestError, unknown
 from interpose.evaluation.spectrum import joint_angles, psent, pskl
+from interpose.geometry.constant import Constant
 from interpose.methods.weights import Card
 from interpose.models.stmi_gan import (
     BRANCHES,
     CONFIGS,
     ENDS,
+    FIRST,
     PAPER,
+    SECOND,
     Discriminator,
     Frame,
     Generator,
@@ -41,14 +44,15 @@ from interpose.observation.corruption import LIMBS, gap_mask
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
-from interpose.training.loop import Opponent, Settings, Trainer, pick_device, processes, restore
+from interpose.training.device import pick_device, processes, send
+from interpose.training.loop import Opponent, Settings, Trainer, restore
 from interpose.training.windows import Windows
 
 DATASETS = ("lafan1", "bandai")
 # Whose distances to all other joints tell most actions apart: hands, feet and head.
 EXTREMITIES = {JOINTS.index(name) for name in ("LeftHand", "RightHand", "LeftToe", "RightToe", "Head")}
-LIMB_PAIRS = [i for i, pair in enumerate(ENDS) if EXTREMITIES & set(pair)]
-BONE_PAIRS = [ENDS.index((parent, joint)) for joint, parent in enumerate(PARENTS) if parent >= 0]
+LIMB_PAIRS = Constant([i for i, pair in enumerate(ENDS) if EXTREMITIES & set(pair)])
+BONE_PAIRS = Constant([ENDS.index((parent, joint)) for joint, parent in enumerate(PARENTS) if parent >= 0])
 
 
 @dataclass
@@ -133,11 +137,11 @@ def draw(rng: np.random.Generator, windows: Windows, settings: StmiGanSettings, 
     block = windows.length // frames
     if block > 1:
         chosen = np.arange(frames) * block + rng.integers(block, size=(batch, frames))
-        index = torch.from_numpy(chosen).to(positions.device)
+        index = send(chosen, positions.device)
         positions = positions[torch.arange(batch, device=positions.device)[:, None], index]
     # As often smaller than taller: .7 to 1.3, as in the paper.
     tall = rng.uniform(2.0 - settings.tallest, settings.tallest, batch)
-    return positions * torch.from_numpy(tall).to(positions)[:, None, None, None]
+    return positions * send(tall.astype(np.float32), positions.device)[:, None, None, None]
 
 
 @dataclass
@@ -168,7 +172,7 @@ class Game:
     def play(self, rng: np.random.Generator) -> Motions:
         """Motions of the data, with holes, and what the generator makes of them."""
         positions = draw(rng, self.windows, self.settings, self.batch)
-        observed = torch.from_numpy(corrupt(rng, self.settings, self.batch)).to(positions.device)
+        observed = send(corrupt(rng, self.settings, self.batch), positions.device)
         truth = Frame.of(positions, observed).align(positions)
         with torch.autocast(truth.device.type, torch.bfloat16):
             made = self.generator.aligned(truth, observed, noise(self.generator, len(truth), truth.device))
@@ -216,13 +220,13 @@ class Game:
         apart, true = distances(motions.made) / size, distances(motions.truth) / size
         off = (apart - true).abs()
         whole = seen.all(dim=-1)
-        a, b = (torch.tensor(side, device=whole.device) for side in zip(*ENDS))
-        pairs = (whole[..., a] & whole[..., b])[..., LIMB_PAIRS]
+        pairs = whole[..., FIRST.beside(off)] & whole[..., SECOND.beside(off)]
+        limbs, bones = LIMB_PAIRS.beside(off), BONE_PAIRS.beside(off)
         per = PAPER.frames / frames
         return (
             asked.reconstruction * per * (wrong.square().sum(dim=3) + 1e-12).sqrt().sum(dim=(1, 2)).mean()
-            + asked.limbs * per * (off[..., LIMB_PAIRS] * pairs).sum(dim=(1, 2)).mean()
-            + asked.bones * per * off[..., BONE_PAIRS].sum(dim=(1, 2)).mean()
+            + asked.limbs * per * (off[..., limbs] * pairs[..., limbs]).sum(dim=(1, 2)).mean()
+            + asked.bones * per * off[..., bones].sum(dim=(1, 2)).mean()
         )
 
 

@@ -10,9 +10,12 @@ from torch import Tensor
 
 from interpose.datasets import Pack
 from interpose.errors import RequestError
+from interpose.geometry.constant import Constant
 from interpose.skeletons import SIDES
+from interpose.training.device import send
 
 STEP = 1 / 16384  # metres: positions relative to the hips in 16 bits reach 2 m at .06 mm
+MIRROR = Constant([-1.0, 1.0, 1.0])
 SHORTEST = 30  # frames; shorter clips do not train, longer ones than this are padded with their last pose
 
 
@@ -56,7 +59,7 @@ class Windows:
     def at(self, clip: np.ndarray, first: np.ndarray) -> Tensor:
         """Windows (B, T, 22, 3) in metres, of the given clips from the given frames on."""
         inside = np.minimum(first[:, None] + np.arange(self.length), self.counts[clip][:, None] - 1)
-        index = torch.from_numpy(self.starts[clip][:, None] + inside).to(self.device)
+        index = send(self.starts[clip][:, None] + inside, self.device)
         return self.hips[index][:, :, None] + self.offset[index].to(torch.float32) * STEP
 
     def draw(self, rng: np.random.Generator, batch: int, mirror: bool = True) -> Tensor:
@@ -65,8 +68,8 @@ class Windows:
         first = (rng.random(batch) * (np.maximum(self.counts[clip] - self.length, 0) + 1)).astype(int)
         positions = self.at(clip, first)
         if mirror:
-            flip = torch.from_numpy(rng.random(batch) < 0.5).to(self.device)[:, None, None, None]
-            mirrored = positions[:, :, self.sides] * positions.new_tensor([-1.0, 1.0, 1.0])
+            flip = send(rng.random(batch) < 0.5, self.device)[:, None, None, None]
+            mirrored = positions[:, :, self.sides] * MIRROR.beside(positions)
             positions = torch.where(flip, mirrored, positions)
         return positions
 
