@@ -217,23 +217,34 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
 
 
-def test_weights_beside_the_graph(model, tmp_path, monkeypatch):
-    """In 16 bits and in files that are not too large; training goes on from them, or else from the graph."""
-    path, one = tmp_path / "small.onnx", copy.deepcopy(model).float()
-    monkeypatch.setattr(export, "SHARD", 20_000)
-    export.export_base_onnx(one, path)
-    shards = shard_paths(path)
-    assert len(shards) > 1
-    assert all(shard.stat().st_size < 30_000 for shard in shards)
-    for exact in (False, True):
-        again = Base(TINY)
-        restore(again, path)
-        for mine, theirs in zip(again.state_dict().values(), one.state_dict().values()):
-            # The graph has small values whole.
-            whole = exact and theirs.numel() < 1024
-            assert torch.equal(mine, theirs if whole else theirs.half().float())
-        for shard in shards:
-            shard.unlink(missing_ok=True)
+def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
+    """In 16 bits and in files that are not too large; training goes on from them, or else from the graph.
+
+    A graph whose weights take several files reads them, instead of holding them once more.
+    """
+    one, said, sizes = copy.deepcopy(model).float(), [], []
+    for size, files in ((export.SHARD, 1), (20_000, 3)):
+        path = tmp_path / str(files) / "small.onnx"
+        path.parent.mkdir()
+        monkeypatch.setattr(export, "SHARD", size)
+        export.export_base_onnx(one, path)
+        shards = shard_paths(path)
+        assert len(shards) == files
+        assert all(shard.stat().st_size < size + 10_000 for shard in shards)
+        sizes.append(path.stat().st_size)
+        local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
+        said.append(method.run(path, local, root, known == 1, 0, bones, (pinned, pins)))
+        for exact in (False, True) if files == 1 else (False,):
+            again = Base(TINY)
+            restore(again, path)
+            for mine, theirs in zip(again.state_dict().values(), one.state_dict().values()):
+                # The graph has small values whole.
+                whole = exact and theirs.numel() < 1024
+                assert torch.equal(mine, theirs if whole else theirs.half().float())
+            if files == 1:
+                shards[0].unlink(missing_ok=True)
+    assert np.array_equal(said[0].local, said[1].local)
+    assert sizes[1] < sizes[0] - 40_000
 
 
 def test_it_completes_clips(trained, cmu_walk, monkeypatch):

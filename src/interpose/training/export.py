@@ -12,6 +12,7 @@ import numpy as np
 import onnx
 import torch
 from onnx import TensorProto, helper, numpy_helper
+from onnx.external_data_helper import set_external_data
 from safetensors.torch import save
 from torch.nn.attention import SDPBackend, sdpa_kernel
 
@@ -168,7 +169,10 @@ def _strip(model: onnx.ModelProto) -> None:
 
 
 def save_weights(model: torch.nn.Module, path: Path) -> None:
-    """Write a model's weights in 16 bits beside its graph, as safetensors in files of less than 15 MB."""
+    """Write a model's weights in 16 bits beside its graph, as safetensors in files of less than 15 MB.
+
+    Where it takes more than one file the graph lets go of its own copy and reads them, too.
+    """
     shards: list[dict[str, torch.Tensor]] = [{}]
     room = SHARD
     for name, value in model.state_dict().items():
@@ -185,6 +189,29 @@ def save_weights(model: torch.nn.Module, path: Path) -> None:
         where = path.with_name(f"{path.stem}{of}.safetensors")
         where.with_suffix(".new").write_bytes(save(shard))
         os.replace(where.with_suffix(".new"), where)
+    if len(shards) > 1:
+        _point(path)
+
+
+def _point(path: Path) -> None:
+    """Make a graph read its weights from the safetensors beside it.
+
+    Source: safetensors' format (its header's length in 8 bytes, the header, the data), ONNX external data.
+    """
+    graph = onnx.load(path)
+    held = {one.name.removesuffix(".half"): one for one in graph.graph.initializer}
+    for shard in shard_paths(path):
+        data = shard.read_bytes()
+        begin = 8 + int.from_bytes(data[:8], "little")
+        for name, where in json.loads(data[8:begin]).items():
+            start, stop = (begin + at for at in where["data_offsets"])
+            if name not in held or held[name].raw_data != data[start:stop]:
+                continue  # not in 16 bits in the graph: small ones
+            set_external_data(held[name], shard.name, start, stop - start)
+            held[name].ClearField("raw_data")
+    new = path.with_suffix(".new")
+    onnx.save(graph, new)
+    os.replace(new, path)
 
 
 def _halve(model: onnx.ModelProto) -> None:
