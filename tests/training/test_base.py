@@ -17,6 +17,7 @@ from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods import base as method  # noqa: E402
 from interpose.methods import registry, weights  # noqa: E402
 from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns, room  # noqa: E402
+from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
 from interpose.training import export  # noqa: E402
@@ -71,20 +72,21 @@ def test_the_starting_point_goes_on_as_the_motion_does():
     known[:, 10:20] = False
     line = 2.0 + 0.3 * time
     far = torch.full((1,), 1e9, dtype=torch.float64)
-    assert torch.allclose(complete_columns(line, known, far), line)
+    assert torch.allclose(complete_columns(line, known, *neighbours(known), far), line)
     cubic = 0.001 * (time - 14.5) ** 3
-    off = (complete_columns(cubic, known, far) - cubic).abs().max()
-    straight = (complete_columns(cubic, known, None) - cubic).abs().max()
+    off = (complete_columns(cubic, known, *neighbours(known), far) - cubic).abs().max()
+    straight = (complete_columns(cubic, known, *neighbours(known), None) - cubic).abs().max()
     assert off < 0.4 * straight
     known[:, 10:] = False
-    on = complete_columns(line, known, torch.full((1,), 2.0, dtype=torch.float64))[0, 9:, 0].diff()
+    soon = torch.full((1,), 2.0, dtype=torch.float64)
+    on = complete_columns(line, known, *neighbours(known), soon)[0, 9:, 0].diff()
     assert on[0] > 0
     assert on[-1].abs() < 1e-3
 
 
 def test_there_is_no_room_at_known_frames_and_all_of_it_far_away():
     known = torch.tensor([[1, 1, 0, 0, 0, 1, 0, 0], [1, 0, 1, 1, 1, 1, 1, 1], [0] * 8, [0.5] * 8])
-    gap, short, nothing, noisy = room(known)
+    gap, short, nothing, noisy = room(known, *neighbours(known > 0))
     assert (gap[known[0] == 1] == 0).all()
     assert gap[3] > gap[2] == gap[4] > short[1] > 0
     assert gap[7] > gap[6] > gap[2]

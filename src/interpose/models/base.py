@@ -14,12 +14,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
-from interpose.geometry.ground import turn
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.skeletons.body import facing
@@ -36,6 +36,9 @@ REACH_TURN, REACH_WAY = 20.0, 45.0
 REACH = Constant([REACH_TURN] * COUNT + [REACH_WAY])
 REST = Constant([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # columns of a joint that stands as in the T-pose
 FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
+# Rows times the cosine of the first, the sine of the second and the third are turned about Y.
+FLAT, UP = Constant(np.diag([1.0, 0.0, 1.0])), Constant(np.diag([0.0, 1.0, 0.0]))
+QUARTER = Constant([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
 # Numbers of a frame that the network sees: columns of rotations, hips, joints around them, how both move,
 # what is known, pins and whether there are any, and how near known frames are.
 SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
@@ -101,14 +104,17 @@ class Motion:
         return kinematics.forward(self.local, torch.cat([self.root[:, :, None], move], dim=2), PARENTS)
 
 
-def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Tensor:
+def complete_columns(
+    values: Tensor, known: Tensor, last: Tensor, first: Tensor, reach: Tensor | None
+) -> Tensor:
     """Values (N, T, n) of known frames (N, T); in between a line that is left and met at their velocities.
+
+    `last` and `first` (N, T) are the known `neighbours` of each frame.
 
     A cubic of Hermite in which what the velocities differ from the line by dies away within `reach` (n)
     frames, so that long gaps do not swing out. Next to a lone known frame, and without `reach`, there is no
     velocity but the line's. At open ends the value is held, after its velocity has died away.
     """
-    last, first = neighbours(known)
     frame = torch.arange(values.shape[1], device=values.device)
     since, until = ((d.clamp(min=0)).to(values.dtype)[..., None] for d in (frame - last, first - frame))
     length = (first - last).to(values.dtype)[..., None]
@@ -133,20 +139,25 @@ def complete_columns(values: Tensor, known: Tensor, reach: Tensor | None) -> Ten
     )
 
 
-def room(known: Tensor) -> Tensor:
-    """How much may be added to the starting point: 0 at frames (N, T) that are known exactly, to 1 far away.
+def room(known: Tensor, last: Tensor, first: Tensor) -> Tensor:
+    """How much may be added to the starting point: 0 at frames (..., T) that are known exactly, to 1 far
+    away; `last` and `first` are the `neighbours` of each that are known at all.
 
     The starting point is as good as its neighbours are near: so the network, whose answers are all of about
     one size, need not learn to keep still beside them. What is noisy may always change.
     """
     held = known > 0
-    last, first = neighbours(held)
-    frame = torch.arange(known.shape[1], device=known.device)
+    frame = torch.arange(known.shape[-1], device=known.device)
     since, until = (d.clamp(min=0).to(known.dtype) for d in (frame - last, first - frame))
     # Between two known frames half their harmonic mean, at open ends the distance to the only one.
     away = torch.where(first > last, since * until / (since + until).clamp(min=1.0), since + until)
-    share = torch.where(held.any(dim=1, keepdim=True), away / (away + NEAR), 1.0)
+    share = torch.where(held.any(dim=-1, keepdim=True), away / (away + NEAR), 1.0)
     return torch.where(held & (known < 1), 0.5, share)
+
+
+def turned_by(values: Tensor, matrix: Tensor) -> Tensor:
+    """Vectors (B, ..., 3), or several of them one after the other (B, ..., 3 n), as rows times (B, 3, 3)."""
+    return (values.reshape(values.shape[0], -1, 3) @ matrix).reshape(values.shape)
 
 
 def mixed(chosen: Tensor, a: Tensor, b: Tensor) -> Tensor:
@@ -187,14 +198,22 @@ class Start:
     Attributes:
         motion: the classical completion.
         turned, placed: (B, T, 22, 4) and (B, T, 22, 3), its global rotations and positions.
-        origin, yaw: (B, 3) and (B,), of the pose that all is seen from.
+        origin: (B, 3), of the pose that all is seen from.
+        away, back: (B, 3, 3), what turns rows into its heading, and back.
+        columns: (B, T, 22, 6) global rotations, as seen from there.
+        last, first: (B, 25, T) the known frames around each: of the 23 values that may be known, of the hips'
+            rotation and place together, and of all of them together.
     """
 
     motion: Motion
     turned: Tensor
     placed: Tensor
     origin: Tensor
-    yaw: Tensor
+    away: Tensor
+    back: Tensor
+    columns: Tensor
+    last: Tensor
+    first: Tensor
 
 
 @dataclass
@@ -256,10 +275,13 @@ class Base(nn.Module):
         columns = torch.cat([rotations.to_6d(local), nn.functional.pad(root, (0, 3))[:, :, None]], dim=2)
         columns = held.to(columns.dtype)[..., None] * columns
         flat = columns.transpose(1, 2).flatten(0, 1)
-        reach = REACH.beside(flat).repeat(batch)[:, None, None]
-        done = complete_columns(
-            flat, held.transpose(1, 2).flatten(0, 1), reach if self.config.velocities else None
-        )
+        whole = held.all(dim=2)
+        placed_hips = held[..., 0] & held[..., COUNT]
+        asked = torch.cat([held.transpose(1, 2), placed_hips[:, None], whole[:, None]], dim=1)
+        last, first = (found.unflatten(0, (batch, -1)) for found in neighbours(asked.flatten(0, 1)))
+        reach = REACH.beside(flat).repeat(batch)[:, None, None] if self.config.velocities else None
+        before, after = (around[:, : COUNT + 1].flatten(0, 1) for around in (last, first))
+        done = complete_columns(flat, held.transpose(1, 2).flatten(0, 1), before, after, reach)
         done = done.unflatten(0, (batch, COUNT + 1)).transpose(1, 2)
         # Joints that are never known stand as in the T-pose.
         never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
@@ -267,35 +289,35 @@ class Base(nn.Module):
         turned = mixed(held[:, :, :COUNT], local, turned)
         motion = Motion(turned, done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
-        seen = held[..., 0] & held[..., COUNT]
         if self.config.near:
             frame = torch.arange(count, device=held.device)
-            missing = torch.where(held.all(dim=2), count - 1, frame).amin(dim=1, keepdim=True)
-            at = neighbours(seen)[0].gather(1, missing)
+            missing = torch.where(whole, count - 1, frame).amin(dim=1, keepdim=True)
+            at = last[:, -2].gather(1, missing)
         else:
             at = torch.zeros(batch, 1, dtype=torch.long, device=held.device)
         pose = pick(placed.flatten(2), at).unflatten(2, (COUNT, 3))[:, 0]
         origin = pose[:, 0] * FLOOR.beside(pose)
-        return Start(motion, globals_, placed, origin, facing(pose))
+        yaw = facing(pose)[:, None, None]
+        back = torch.cos(yaw) * FLAT.beside(pose) + torch.sin(yaw) * QUARTER.beside(pose) + UP.beside(pose)
+        away = back.transpose(1, 2)
+        columns = turned_by(rotations.to_6d(globals_), away)
+        return Start(motion, globals_, placed, origin, away, back, columns, last, first)
 
     def features(self, start: Start, known: Tensor, pinned: Tensor, pins: Tensor) -> Tensor:
         """(B, T, SEEN): what the network sees of the starting point, from where it is seen."""
-        ahead = rotations.about("Y", -start.yaw)[:, None, None]
-        turned = rotations.to_6d(rotations.multiply(ahead, start.turned))
-        yaw = -start.yaw[:, None, None]
-        placed = turn(start.placed - start.origin[:, None, None], yaw)
+        placed = turned_by(start.placed - start.origin[:, None, None], start.away)
         hips, around = placed[:, :, 0], placed[:, :, 1:] - placed[:, :, :1]
         around = nn.functional.pad(around, (0, 0, 1, 0))  # the hips themselves, at 0
         steps = [nn.functional.pad(some.diff(dim=1), (0, 0, 1, 0)) for some in (hips, around.flatten(2))]
         there = pins.to(hips.dtype)
-        off = there[..., None] * turn(pinned - start.placed, yaw)
-        last, first = neighbours((known > 0).all(dim=2))
+        off = there[..., None] * turned_by(pinned - start.placed, start.away)
+        last, first = start.last[:, -1], start.first[:, -1]
         frame = torch.arange(known.shape[1], device=known.device)
         far = torch.stack([frame - last, first - frame], dim=-1).clamp(min=0).to(hips.dtype)
         near = torch.cat([far / SECOND, 1 / (1 + far)], dim=-1)
         if not self.config.distances:
             near = torch.zeros_like(near)
-        parts = [turned.flatten(2), hips, around.flatten(2), *(VELOCITY * step for step in steps)]
+        parts = [start.columns.flatten(2), hips, around.flatten(2), *(VELOCITY * step for step in steps)]
         parts += [known.to(hips.dtype), off.flatten(2), there, near]
         return torch.cat(parts, dim=2)
 
@@ -332,21 +354,19 @@ class Base(nn.Module):
         exactly = known >= 1
         open_ = 1 - exactly.to(known.dtype)
         if config.room and config.residual:
-            flat = room(known.transpose(1, 2).flatten(0, 1))
-            open_ = flat.unflatten(0, (known.shape[0], -1)).transpose(1, 2)
+            last, first = start.last[:, : COUNT + 1], start.first[:, : COUNT + 1]
+            open_ = room(known.transpose(1, 2), last, first).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
         above = kinematics.ancestors(PARENTS).beside(open_)
         share = (above * open_[..., None, :COUNT]).amax(dim=-1)[..., None]
-        ahead = rotations.about("Y", -start.yaw)[:, None, None]
-        begin = rotations.to_6d(rotations.multiply(ahead, start.turned))
+        begin = start.columns
         columns = columns.unflatten(2, (COUNT, 6))
         if not config.residual:
             columns = columns + REST.beside(columns) - begin
-        turned = rotations.from_6d(begin + share * columns)
-        turned = rotations.multiply(rotations.conjugate(ahead), turned)
+        turned = rotations.from_6d(turned_by(begin + share * columns, start.back))
         turned = kinematics.local_rotations(turned, PARENTS)
         turned = mixed(exactly[..., :COUNT], local, turned)
-        way = turn(moved, start.yaw[:, None])
+        way = turned_by(moved, start.back)
         if not config.residual:
             way = way + start.origin[:, None] - start.motion.root
         placed = start.motion.root + open_[..., COUNT:] * way
