@@ -21,6 +21,8 @@ METHODS: dict[str, tuple[str, str]] = {
     "kalman": ("interpose.methods.kalman", "Kalman"),
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
+    "stmi-gan": ("interpose.methods.stmi_gan", "StmiGan"),
+    "base": ("interpose.methods.base", "Base"),
     "small": ("interpose.methods.base", "small"),
     "small-open": ("interpose.methods.base", "small_open"),
 }
