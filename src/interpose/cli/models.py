@@ -14,7 +14,6 @@ METHODS = {
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
     "cmib": "conditional in-betweening of Kim et al. 2022: between keys, with an action if you like",
     "stmi-gan": "the spatio-temporal inpainting GAN of Hernandez Ruiz et al. 2019: forecasts, with samples",
-    "base": "interpose's own network, seven times as large as small",
     "small": "interpose's own network: gaps, lost joints and limbs, pins; any part of a pose is enough",
     "small-open": "the same network, of weights for any use, learned from CMU's data alone",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",

@@ -22,7 +22,6 @@ METHODS: dict[str, tuple[str, str]] = {
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
     "stmi-gan": ("interpose.methods.stmi_gan", "StmiGan"),
-    "base": ("interpose.methods.base", "Base"),
     "small": ("interpose.methods.base", "small"),
     "small-open": ("interpose.methods.base", "small_open"),
 }

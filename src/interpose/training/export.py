@@ -402,7 +402,7 @@ def export_base(
     packs = chosen(packs, settings["datasets"])
     card = Card(
         name=name,
-        method=name if name in METHODS else settings["config"],
+        method=name if name in METHODS else "small",  # which runs networks of that kind, of any size
         description="interpose's own network: whatever is missing of a motion",
         licence=licence or _licence(packs),
         data=_data(packs, splits),
