@@ -123,7 +123,7 @@ def train_cmib(
     settings = settings or CmibSettings()
     device = pick_device()
     torch.manual_seed(settings.seed)
-    labels = labels_of(packs, splits)
+    labels = tuple(start.labels) if start else labels_of(packs, splits)
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6
