@@ -123,7 +123,8 @@ def train_cmib(
     settings = settings or CmibSettings()
     device = pick_device()
     torch.manual_seed(settings.seed)
-    labels = tuple(start.labels) if start else labels_of(packs, splits)
+    before = tuple(start.labels) if start else ()
+    labels = before + tuple(label for label in labels_of(packs, splits) if label not in before)
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6

@@ -79,12 +79,16 @@ def _exported(path: Path) -> dict[str, Tensor]:
 def restore(model: nn.Module, path: Path) -> None:
     """Fill a model with the weights of an exported graph (16 bits of them).
 
-    A part that begins with nothing may be missing: without it the network is the one that was exported.
+    A part that begins with nothing may be missing: without it the network is the one that was exported. Of a
+    table of labels that has grown, the rows that are new stay as they are.
     """
     held = _exported(path)
     with torch.no_grad():
         for name, value in model.state_dict().items():
             if name not in held and not value.any():
+                continue
+            if name.endswith("label.weight") and name in held and len(held[name]) < len(value):
+                value[: len(held[name])] = held[name]
                 continue
             if name not in held or held[name].shape != value.shape:
                 raise FileError(
