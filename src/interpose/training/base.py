@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ from interpose.models.base import CONFIGS, COUNT, FEET, Answer, Base, BaseConfig
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
-from interpose.training.device import fused, pick_device, processes, send
+from interpose.training.device import pick_device, processes, send
 from interpose.training.loop import Settings, Trainer, restore
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
@@ -305,7 +304,6 @@ def train_base(
     fit = max(1, min(settings.longest, int(poses.counts.max()) - 2 * settings.context))
     drawing = replace(settings, longest=fit)
 
-    @partial(fused, device, 6)
     def wrong(
         local: Tensor,
         root: Tensor,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +15,7 @@ from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
-from interpose.training.device import fused, pick_device, processes, send
+from interpose.training.device import pick_device, processes, send
 from interpose.training.loop import Settings, Trainer, restore
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
@@ -138,10 +137,6 @@ def train_cmib(
     moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)
     batch = max(1, settings.batch // processes())
 
-    @partial(fused, device, 3)
-    def wrong(rotation: Tensor, root: Tensor, keys: Tensor, bones: Tensor, label: Tensor) -> Tensor:
-        return losses(Batch(rotation, root, bones, label), keys)
-
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         length = draw_length(rng, settings)
         drawn = poses.draw(rng, batch, length)
@@ -150,7 +145,7 @@ def train_cmib(
         unsaid = send(rng.random(batch) >= settings.labelled, device)
         drawn.label = torch.where(unsaid, 0, drawn.label)
         keys = send(draw_keys(rng, settings, batch, length), device)
-        return wrong(drawn.rotation, drawn.root, keys, drawn.bones, drawn.label)
+        return losses(drawn, keys)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
         if settings.muon:
