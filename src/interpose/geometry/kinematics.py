@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -36,19 +37,8 @@ class _Plan:
     ancestors: Constant
 
 
-_plans: dict[tuple[int, ...], _Plan] = {}
-
-
+@lru_cache(maxsize=64)
 def _plan(parents: tuple[int, ...]) -> _Plan:
-    """Made once for each skeleton: torch.compile looks right through the caches of functools."""
-    if parents not in _plans:
-        if len(_plans) == 64:
-            _plans.clear()
-        _plans[parents] = _make_plan(parents)
-    return _plans[parents]
-
-
-def _make_plan(parents: tuple[int, ...]) -> _Plan:
     depth = [0] * len(parents)
     ancestors = np.eye(len(parents))
     for joint, parent in enumerate(parents):

@@ -304,22 +304,6 @@ def train_base(
     fit = max(1, min(settings.longest, int(poses.counts.max()) - 2 * settings.context))
     drawing = replace(settings, longest=fit)
 
-    def wrong(
-        local: Tensor,
-        root: Tensor,
-        rotation: Tensor,
-        placed: Tensor,
-        known: Tensor,
-        pins: Tensor,
-        label: Tensor,
-        bones: Tensor,
-    ) -> Tensor:
-        start = model.start(local, root, known, bones)
-        seen = model.features(start, known, placed, pins)
-        with torch.autocast(device.type, torch.bfloat16):
-            said = model.encoder(seen, label, bones)
-        return losses(model.answer(start, said, local, known), rotation, placed, known, bones)
-
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
         drawn, task = draw_batch(rng, poses, drawing, batch)
         known, pins = (send(x, device) for x in (task.known, task.pins))
@@ -327,8 +311,13 @@ def train_base(
         seed = int(rng.integers(2**31))
         if task.noisy.any():
             given = spoil(given, send(task.noisy, device), settings.noise, seed)
-        about = (drawn.rotation, drawn.positions(), known, pins, drawn.label, drawn.bones)
-        return wrong(given.local, given.root, *about)
+        placed = drawn.positions()
+        start = model.start(given.local, given.root, known, drawn.bones)
+        seen = model.features(start, known, placed, pins)
+        with torch.autocast(device.type, torch.bfloat16):
+            said = model.encoder(seen, drawn.label, drawn.bones)
+        answer = model.answer(start, said, given.local, known)
+        return losses(answer, drawn.rotation, placed, known, drawn.bones)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
         if settings.muon:

@@ -271,6 +271,7 @@ class Trainer:
                 **self.about,
                 "budget": str(self.budget),
                 "processes": processes(),
+                "device": torch.cuda.get_device_name() if self.device.type == "cuda" else "CPU",
             }
             kept["commit"] = commit()
             (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
