@@ -82,14 +82,15 @@ def embedded(clip: interpose.Clip, path: Path) -> None:
     from interpose.training.stmi_gan import trained
 
     model = trained(weights.find("stmi-gan"))
-    motion = torch.from_numpy(find_humanoid(clip).as_canonical(clip)).float()[None]
+    every = len(clip) // model.config.frames
+    motion = torch.from_numpy(find_humanoid(clip).as_canonical(clip)[::every]).float()[None]
     observed = torch.ones_like(motion, dtype=torch.bool)
-    observed[:, SEEN:] = False
+    observed[:, SEEN // every :] = False
     with torch.no_grad():
         aligned = Frame.of(motion, observed).align(motion)
         rows = model.write(aligned, observed)[0].numpy().T
     rows = (rows - rows.mean()) / rows.std()
-    fps = 30.0 / model.config.together
+    fps = model.config.fps / model.config.together
     image(rows, np.ones(rows.shape, bool), fps, path, "What the frame encoder writes; hidden from 2 s on")
 
 

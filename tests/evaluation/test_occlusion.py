@@ -7,8 +7,9 @@ import pytest
 
 from interpose.errors import RequestError
 from interpose.evaluation import occlusion
+from interpose.methods import weights
 
-FRAMES = occlusion.FRAMES
+FRAMES = occlusion.SECONDS * occlusion.FPS
 
 
 @pytest.fixture(autouse=True)
@@ -28,7 +29,7 @@ def spied(published):  # type: ignore[no-untyped-def]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(occlusion, "DATASETS", ("lafan1",))
         results = {
-            drawn: occlusion.run(published, drawn=drawn, most=1, networks={"spy": spy})
+            drawn: occlusion.run(published, drawn=drawn, rate=30, most=1, networks={"spy": spy})
             for drawn in occlusion.PROBLEMS
         }
     return results, shown
@@ -86,11 +87,23 @@ def test_the_order_of_the_table(spied):
 
 
 def test_the_same_is_hidden_every_time(published, spied):
-    again = occlusion.run(published, most=1)
+    again = occlusion.run(published, rate=30, most=1)
     before = spied[0]["exact"].to_dict()["errors"]["all"]
     for problem, rows in again.to_dict()["errors"]["all"].items():
         for row, figures in rows.items():
             assert figures == before[problem][row]
+
+
+def test_as_few_frames_as_in_the_paper(published):
+    """The installed network sees them frame by frame; what knows 30 a second alone is no row."""
+    card = weights.find("stmi-gan")
+    rows = occlusion.networks([card], 5)
+    assert not occlusion.networks([card], 30)
+    result = occlusion.run(published, most=1, networks=rows)
+    assert result.rows == ("linear", "kalman", "STMI-GAN, paper")
+    assert result.to_dict()["rate"] == 5
+    assert result.to_dict()["hidden"][occlusion.FRAMES_GONE] == pytest.approx(14 / 18)
+    assert result.ratio("all", occlusion.JOINTS_GONE, "STMI-GAN, paper") < 0.7
 
 
 def test_other_ways_to_draw_are_refused(published):

@@ -18,10 +18,10 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import Humanoid, Mapping, find_mapping
 from interpose.skeletons.body import facing
 
-# Frames (standard deviation) over which positions are smoothed inside of gaps: frame by frame the autoencoder
-# trembles by half as much again as real motion. Measured on validation performers: peaks of acceleration are
-# halved, and the error falls by 1 to 2 %.
-SMOOTH = 1.0
+# Seconds (standard deviation) over which positions are smoothed inside of gaps: from frame to frame, of 30 in
+# a second, the autoencoder trembles by half as much again as real motion. Measured on validation performers:
+# peaks of acceleration are halved, and the error falls by 1 to 2 %.
+SMOOTH = 1 / 30
 
 # A network: canonical positions (T, 22, 3) at its frame rate and which are known (T, 22), to positions three
 # times: its own poses in the body's frame, the same on its own trajectory, and settled into what is known.
@@ -88,7 +88,7 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
     seen = known[before] & known[after]
     poses, raw, completed = network(sample(positions, times), seen)
-    calm = ndimage.gaussian_filter1d(completed, SMOOTH, axis=0, mode="nearest")
+    calm = ndimage.gaussian_filter1d(completed, SMOOTH * card.fps, axis=0, mode="nearest")
     completed = np.where(seen[..., None], completed, calm)
     drift = _drift(observation, raw, completed, times, body)
     # Past the last frame of the network's nothing is known of it: that frame is held.
