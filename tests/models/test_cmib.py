@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -259,6 +260,12 @@ def test_the_graph_agrees_with_torch_at_other_sizes_and_training_goes_on_from_it
     restore(again, path)
     for name, value in model.state_dict().items():
         assert torch.allclose(again.state_dict()[name], value, rtol=1e-3, atol=1e-3), name
+    torch.manual_seed(3)
+    grown = Cmib(replace(config, labels=("", "walk", "run")))
+    began = grown.encoder.label.weight[2].clone()
+    restore(grown, path)
+    assert torch.equal(grown.encoder.label.weight[:2], again.encoder.label.weight)
+    assert torch.equal(grown.encoder.label.weight[2], began), "of a label that is new"
     short = Batch(batch.rotation[:1, :33], batch.root[:1, :33], batch.bones[:1], batch.label[:1])
     keys = keys_at(short, 0, 11, 32)
     feed = {

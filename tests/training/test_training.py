@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import signal
 
 import numpy as np
 import pytest
@@ -242,6 +244,31 @@ def test_the_plain_recipe_draws_no_noise(pack, tmp_path, monkeypatch):
     positions, observed = next(given for given in drawn if len(given[0]) == 3)
     assert torch.equal(positions, windows.draw(rng, 3))
     assert np.array_equal(observed.numpy(), corrupt(rng, settings, 0.0, 3))
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_stopped_saves_the_step_that_it_was_at(pack, tmp_path, monkeypatch, number):
+    """And once it is over signals do again what they did before."""
+    drawn = []
+
+    def draw(self, *args):  # type: ignore[no-untyped-def]
+        drawn.append(args)
+        if len(drawn) == 4:  # the first fits the normaliser
+            os.kill(os.getpid(), number)
+        return windows_draw(self, *args)
+
+    windows_draw = Windows.draw
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        monkeypatch.setattr(Windows, "draw", draw)
+        monkeypatch.setattr(cae, "fit_normaliser", lambda *args: drawn.append(args))
+        with pytest.raises(KeyboardInterrupt):
+            train_cae([pack], tmp_path, Budget.parse("50steps"), CaeSettings(length=32, batch=2), say=str)
+        assert signal.getsignal(number) is signal.default_int_handler
+    finally:
+        signal.signal(number, before)
+    assert torch.load(tmp_path / "checkpoint.pt", weights_only=False)["steps"] == 3
+    assert json.loads((tmp_path / "log.jsonl").read_text().splitlines()[-1])["step"] == 3
 
 
 def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):
