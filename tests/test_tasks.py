@@ -286,7 +286,7 @@ def test_nothing_pops_where_clips_are_stitched(stitched):
         jumps = 100 * np.linalg.norm(np.diff(stitched.clip.positions(), 2, axis=0), axis=-1).max(axis=1)
         assert max(jumps[gap.start - 2], jumps[gap.stop - 1]) <= gap.seam_limit + 1e-6
         assert jumps[gap.start - 1 : gap.stop - 1].max() <= gap.peak_limit
-        assert gap.foot_slide < 10, "real feet: 8 to 30 cm/s by this measure"
+        assert gap.foot_slide < 25, "real feet: 8 to 30 cm/s by this measure"
     known = np.ones(len(stitched.clip), bool)
     for gap in stitched.report.gaps:
         known[gap.start : gap.stop] = False

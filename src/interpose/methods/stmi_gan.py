@@ -16,11 +16,13 @@ from interpose.skeletons.body import facing
 
 # A run of missing frames up to this share of a window is seen from both its ends at once.
 SHORT = 0.75
+# Frames of its own that a gap between poses has at least: with fewer nothing tells it how feet step there.
+LEAST = 3
 
 
 @dataclass(frozen=True)
 class StmiGan:
-    """Completes what is missing by what it has seen; thinks at 30 fps on 22 joints scaled to one leg.
+    """Completes what is missing by what it has seen; thinks at the rate of its card on 22 joints scaled to one leg.
 
     Attributes:
         trained: the weights; the installed ones without any.
@@ -40,9 +42,11 @@ class StmiGan:
         return replace(self, temperature=temperature)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
-        """Why not: a skeleton that is no humanoid, or a gap between poses beyond what it was trained for."""
+        """Why not: a skeleton that is no humanoid, or a gap between poses that is too long or too short."""
         if gap.joints is None and gap.stop == len(clip):
             gap = Gap(gap.start, gap.start + 1)  # a forecast goes on as long as it is asked to
+        elif gap.joints is None and len(gap) * self.card.fps < LEAST * clip.fps:
+            return f"its own frames are {1 / self.card.fps:.1f} s apart, too far for a gap as short as this"
         return positional.refuses(clip, gap, self.card)
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
