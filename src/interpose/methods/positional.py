@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy import ndimage
+from scipy import interpolate, ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
@@ -22,6 +22,11 @@ from interpose.skeletons.body import facing
 # a second, the autoencoder trembles by half as much again as real motion. Measured on validation performers:
 # peaks of acceleration are halved, and the error falls by 1 to 2 %.
 SMOOTH = 1 / 30
+
+# Frames a second of a network from which on a clip goes evenly from one to the next. What is known between
+# the frames of a coarser one is kept, so that it is left and met as it was going.
+COARSE = 15.0
+APART = 1.5  # of its steps lie between the last known frame and the first that it says
 
 # A network: canonical positions (T, 22, 3) at its frame rate and which are known (T, 22), to positions three
 # times: its own poses in the body's frame, the same on its own trajectory, and settled into what is known.
@@ -83,10 +88,12 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     base = Spline().complete(clip, observation).clip
     known = body.observed(observation.positions(clip.skeleton), observation.rotation)
     positions = body.as_canonical(clip)
-    times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
-    before = np.floor(times).astype(int)
-    after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
-    seen = known[before] & known[after]
+    coarse, step = card.fps < COARSE, clip.fps / card.fps
+    # A coarse one says one frame more where the clip ends between two of its own.
+    stop = len(clip) - 1 + step if coarse else len(clip) - 0.5
+    times = np.round(np.arange(0, stop, step), 9)
+    before, after = (np.minimum(of(times).astype(int), len(clip) - 1) for of in (np.floor, np.ceil))
+    seen = known[before] & known[after] & (times < len(clip))[:, None]
     poses, raw, completed = network(sample(positions, times), seen)
     calm = ndimage.gaussian_filter1d(completed, SMOOTH * card.fps, axis=0, mode="nearest")
     completed = np.where(seen[..., None], completed, calm)
@@ -95,13 +102,43 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
     like = body.rotations(base)
     ahead = rotations.about("Y", -facing(body.as_canonical(base)))[:, None]
-    spoken = body.from_canonical(sample_smooth(completed, back), like)
-    share = sample(handover(seen, over)[..., None], back)
+    if coarse:
+        placed, share = woven(completed, times, positions, known), 1.0 - known[..., None]
+    else:
+        placed, share = sample_smooth(completed, back), sample(handover(seen, over)[..., None], back)
+    spoken = body.from_canonical(placed, like)
     spoken = share * spoken + (1 - share) * body.positions(base) * body.hand
     own = body.from_canonical(sample_smooth(poses, back), rotations.multiply(ahead, like))
     rows, joints = body.mapping.mapped
     notes = {"model": card.name, "drift": drift}
     return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
+
+
+def woven(said: np.ndarray, times: np.ndarray, positions: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """Positions (F, 22, 3) that go smoothly through what is `known` (F, 22) of `positions`, and through what
+    is `said` (T, 22, 3) at `times` (T) in frames, where that is far enough from known frames.
+    """
+    frames, woven = np.arange(len(known)), positions.copy()
+    patterns, which = np.unique(known, axis=1, return_inverse=True)
+    for number, held in enumerate(patterns.T):
+        if held.all():
+            continue
+        joints = np.flatnonzero(which.ravel() == number)
+        away = (
+            ndimage.distance_transform_edt(np.logical_not(held)) if held.any() else np.full(len(held), np.inf)
+        )
+        free = (
+            away[np.minimum(np.round(times).astype(int), len(held) - 1)] >= APART * np.diff(times[:2]).sum()
+        )
+        at = np.concatenate([frames[held], times[free]])
+        order = np.argsort(at)
+        values = np.concatenate([positions[held][:, joints], said[free][:, joints]])[order]
+        if len(at) == 1:
+            woven[:, joints] = values
+            continue
+        curve = interpolate.CubicSpline(at[order], values)
+        woven[:, joints] = curve(np.clip(frames, at.min(), at.max()))
+    return woven
 
 
 def _drift(

@@ -22,7 +22,7 @@ LEAST = 3
 
 @dataclass(frozen=True)
 class StmiGan:
-    """Completes what is missing by what it has seen; thinks at the rate of its card on 22 joints scaled to one leg.
+    """Completes what is missing by what it has seen; thinks at its card's rate on 22 joints of one leg.
 
     Attributes:
         trained: the weights; the installed ones without any.
