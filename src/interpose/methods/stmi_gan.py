@@ -16,8 +16,6 @@ from interpose.skeletons.body import facing
 
 # A run of missing frames up to this share of a window is seen from both its ends at once.
 SHORT = 0.75
-# Frames of its own that a gap between poses has at least: with fewer nothing tells it how feet step there.
-LEAST = 3
 
 
 @dataclass(frozen=True)
@@ -42,11 +40,13 @@ class StmiGan:
         return replace(self, temperature=temperature)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
-        """Why not: a skeleton that is no humanoid, or a gap between poses that is too long or too short."""
+        """Why not: a skeleton that is no humanoid, or a gap between poses unless it was trained for that."""
         if gap.joints is None and gap.stop == len(clip):
             gap = Gap(gap.start, gap.start + 1)  # a forecast goes on as long as it is asked to
-        elif gap.joints is None and len(gap) * self.card.fps < LEAST * clip.fps:
-            return f"its own frames are {1 / self.card.fps:.1f} s apart, too far for a gap as short as this"
+        elif gap.joints is None and self.card.training["config"] == "paper":
+            return (
+                "it was trained on forecasts and on lost joints, as in its paper, not on gaps between poses"
+            )
         return positional.refuses(clip, gap, self.card)
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
@@ -107,8 +107,8 @@ def run_long(
     for begin, end in runs(np.logical_not(seen.all(axis=1))):
         while begin < end:
             short = end - begin <= SHORT * length and end < len(held)
-            start = (begin + end - length) // 2 if short else begin - length // 2
-            start = max(min(start, len(held) - length), 0)
+            start = min((begin + end - length) // 2, len(held) - length) if short else begin - length // 2
+            start = max(start, 0)
             inside = start + np.arange(length)
             index = np.minimum(inside, len(held) - 1)
             observed = known[index] & (inside < len(held))[:, None]

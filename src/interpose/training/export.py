@@ -369,7 +369,8 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
         licence=_licence(packs),
         data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
-        tasks=["forecast", "fill", "recover"],
+        # In the paper there are no gaps between poses, nor in its configuration.
+        tasks=["forecast", "recover", *(["fill"] if settings["config"] == "dense" else [])],
         joints=list(JOINTS),
         fps=config.fps,
         max_gap=config.frames // 2,
