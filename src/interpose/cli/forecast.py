@@ -46,8 +46,8 @@ def forecast(
     Try:
       interpose forecast take.bvh
       interpose forecast take.bvh --frames 120 --player
-      interpose forecast take.bvh --samples 5 --seed 1 --player
-      interpose forecast take.bvh --samples 5 --temperature 2
+      interpose forecast take.bvh --method stmi-gan --samples 5 --seed 1 --player
+      interpose forecast take.bvh --method stmi-gan --samples 5 --temperature 2
 
     Args:
         file: the clip (.bvh, .npz, .amc).
