@@ -9,11 +9,11 @@ from interpose.methods.protocol import Method
 from interpose.observation import Gap
 
 # Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
-# keys, the best one first; measured on validation performers. Amid motion joints are off by 1.8, 3.8 and
-# 7.8 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
-# these performers, 2.7, 6.6, 12.4 with the spline (bench threshold). Between two lone keys a second apart 5.6
-# with `small` and 6.3 with `cmib`, two seconds apart with one more in the middle 5.9 and 6.1. One joint, or
-# three, or a limb that is lost 4.9, 7.9 and 10.8 with `small`, 8.8, 13.9 and 16.5 with `cae` (bench every).
+# keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.6 and
+# 7.4 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
+# these performers, 2.7, 6.6, 12.4 with the spline (bench threshold). Between two lone keys a second apart 5.5
+# with `small` and 5.7 with `cmib`, two seconds apart with one more in the middle 5.7 and 5.8. One joint, or
+# three, or a limb that is lost 4.6, 6.6 and 9.4 with `small`, 8.8, 13.9 and 16.5 with `cae` (bench every).
 # `small-open` stands in where only weights for any use are installed, or asked for.
 NETWORKS, KEYS = ("small", "cae", "small-open"), ("small", "cmib", "small-open")
 
