@@ -224,7 +224,7 @@ def test_a_new_path_keeps_ends_height_and_pose(batch):
     step, old = (np.diff(b.root[0].numpy(), axis=0) for b in (fresh, batch))
     way, before = (np.arctan2(s[20:40, 0], s[20:40, 2]) for s in (step, old))
     facing = rotations.multiply(fresh.rotation[0, 20:40, 0], rotations.conjugate(batch.rotation[0, 20:40, 0]))
-    turned = 2 * np.arctan2(facing[:, 2], facing[:, 0]).numpy()
+    turned = 2 * np.arctan2(*facing.numpy()[:, [2, 0]].T)
     assert np.abs(np.angle(np.exp(1j * (way - before - turned)))).mean() < 0.1
 
 
