@@ -40,13 +40,15 @@ class StmiGan:
         return replace(self, temperature=temperature)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
-        """Why not: a skeleton that is no humanoid, or a gap between poses unless it was trained for that."""
+        """Why not: a skeleton that is no humanoid, or what it was not trained for: as in its paper, that is
+        gaps between poses, and going on from little motion."""
+        paper, half = self.card.training["config"] == "paper", self.card.training["network"]["frames"] // 2
         if gap.joints is None and gap.stop == len(clip):
+            if paper and gap.start * self.card.fps < half * clip.fps:
+                return f"it goes on from {half / self.card.fps:g} seconds of motion, and here is less"
             gap = Gap(gap.start, gap.start + 1)  # a forecast goes on as long as it is asked to
-        elif gap.joints is None and self.card.training["config"] == "paper":
-            return (
-                "it was trained on forecasts and on lost joints, as in its paper, not on gaps between poses"
-            )
+        elif gap.joints is None and paper:
+            return "it was trained on forecasts and on lost joints, not on gaps between poses"
         return positional.refuses(clip, gap, self.card)
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
