@@ -43,9 +43,9 @@ def test_coarse_frames_are_woven_into_what_is_known():
     known[:, 3] = False  # never
     said = np.stack([times, 2 * times, -times], axis=-1)[:, None].repeat(22, axis=1)
     given = np.where(known[..., None], line, 1e6)
-    assert np.abs(positional.woven(said, times, given, known) - line).max() < 1e-6
+    assert np.abs(positional.weave(said, times, given, known) - line).max() < 1e-6
     said[5] += 1.0  # at frame 30
-    woven = positional.woven(said, times, given, known)
+    woven = positional.weave(said, times, given, known)
     assert np.array_equal(woven[:20, :3], line[:20, :3])
     assert woven[30, 0] == pytest.approx(line[30, 0] + 1.0)
     assert np.abs(np.diff(woven - line, 2, axis=0)).max() < 0.2, "bent, nowhere broken"

@@ -7,7 +7,10 @@ from typing import Any
 
 from array_api_compat import array_namespace
 
+from interpose.geometry.constant import Constant
+
 Array = Any
+FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
 
 
 def wrap(angles: Array) -> Array:

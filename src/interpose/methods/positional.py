@@ -103,7 +103,7 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     like = body.rotations(base)
     ahead = rotations.about("Y", -facing(body.as_canonical(base)))[:, None]
     if coarse:
-        placed, share = woven(completed, times, positions, known), 1.0 - known[..., None]
+        placed, share = weave(completed, times, positions, known), 1.0 - known[..., None]
     else:
         placed, share = sample_smooth(completed, back), sample(handover(seen, over)[..., None], back)
     spoken = body.from_canonical(placed, like)
@@ -114,31 +114,28 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
 
 
-def woven(said: np.ndarray, times: np.ndarray, positions: np.ndarray, known: np.ndarray) -> np.ndarray:
+def weave(said: np.ndarray, times: np.ndarray, positions: np.ndarray, known: np.ndarray) -> np.ndarray:
     """Positions (F, 22, 3) that go smoothly through what is `known` (F, 22) of `positions`, and through what
     is `said` (T, 22, 3) at `times` (T) in frames, where that is far enough from known frames.
     """
-    frames, woven = np.arange(len(known)), positions.copy()
+    frames, step, done = np.arange(len(known)), np.diff(times[:2]).sum(), positions.copy()
+    nearest = np.minimum(np.round(times).astype(int), len(known) - 1)
     patterns, which = np.unique(known, axis=1, return_inverse=True)
     for number, held in enumerate(patterns.T):
         if held.all():
             continue
-        joints = np.flatnonzero(which.ravel() == number)
-        away = (
-            ndimage.distance_transform_edt(np.logical_not(held)) if held.any() else np.full(len(held), np.inf)
-        )
-        free = (
-            away[np.minimum(np.round(times).astype(int), len(held) - 1)] >= APART * np.diff(times[:2]).sum()
-        )
+        joints, lost = np.flatnonzero(which.ravel() == number), np.logical_not(held)
+        away = ndimage.distance_transform_edt(lost) if held.any() else np.full(len(held), np.inf)
+        free = away[nearest] >= APART * step
         at = np.concatenate([frames[held], times[free]])
         order = np.argsort(at)
         values = np.concatenate([positions[held][:, joints], said[free][:, joints]])[order]
         if len(at) == 1:
-            woven[:, joints] = values
+            done[:, joints] = values
             continue
         curve = interpolate.CubicSpline(at[order], values)
-        woven[:, joints] = curve(np.clip(frames, at.min(), at.max()))
-    return woven
+        done[:, joints] = curve(np.clip(frames, at.min(), at.max()))
+    return done
 
 
 def _drift(

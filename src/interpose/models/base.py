@@ -20,6 +20,7 @@ from torch import Tensor, nn
 
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
+from interpose.geometry.ground import FLOOR
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.skeletons.body import facing
@@ -35,7 +36,6 @@ VELOCITY = 10.0  # what velocities (m or matrix entries a frame) are multiplied 
 REACH_TURN, REACH_WAY = 20.0, 45.0
 REACH = Constant([REACH_TURN] * COUNT + [REACH_WAY])
 REST = Constant([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # columns of a joint that stands as in the T-pose
-FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
 # Rows times the cosine of the first, the sine of the second and the third are turned about Y.
 FLAT, UP = Constant(np.diag([1.0, 0.0, 1.0])), Constant(np.diag([0.0, 1.0, 0.0]))
 QUARTER = Constant([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])

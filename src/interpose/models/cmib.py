@@ -14,7 +14,7 @@ from torch.nn.attention import SDPBackend, sdpa_kernel
 
 from interpose.geometry import rotations
 from interpose.geometry.constant import Constant
-from interpose.geometry.ground import turn
+from interpose.geometry.ground import FLOOR, turn
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.skeletons.body import facing
@@ -22,7 +22,6 @@ from interpose.skeletons.body import facing
 POSITIONS = 3 * len(JOINTS)
 
 NO_TURN = Constant([1.0, 0.0, 0.0, 0.0])
-FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
 PLACE = 0.3  # deviation of learned positions at first: of about the size of the numbers of a frame
 
 
