@@ -98,7 +98,9 @@ def test_as_few_frames_as_in_the_paper(published):
     """The installed network sees them frame by frame; what knows 30 a second alone is no row."""
     card = weights.find("stmi-gan")
     rows = occlusion.networks([card], 5)
-    assert not occlusion.networks([card], 30)
+    with pytest.raises(RequestError, match="20 frames, and windows have 120") as error:
+        occlusion.networks([card], 30)
+    assert "--fps 5" in error.value.fix
     result = occlusion.run(published, most=1, networks=rows)
     assert result.rows == ("linear", "kalman", "STMI-GAN, paper")
     assert result.to_dict()["rate"] == 5

@@ -611,15 +611,15 @@ def occlusion(
 
     Args:
         weights: a folder that `interpose export stmi-gan` wrote; may be repeated. The installed ones are a
-            row in any case. Those of the configuration dense are measured at 30 frames a second alone.
+            row where they fit. Those of the configuration dense are measured at 30 frames a second alone.
         drawn: exact; or code, as the public code draws: with replacement, so that about 55 % is lost.
         fps: frames a second that are measured: 5 as in the paper, or 30, at which cae is a row, too.
         most: windows of each data set; all without it.
     """
-    from interpose.evaluation.occlusion import networks, run
+    from interpose.evaluation.occlusion import networks, run, sees
     from interpose.methods.weights import cards, load
 
-    trained = [card for card in cards() if card.method == "stmi-gan"]
+    trained = [card for card in cards() if card.method == "stmi-gan" and sees(card, fps)]
     trained += [load(folder, "stmi-gan") for folder in weights]
     with _bar() as progress:
         result = run(asked.data, asked.split, drawn, fps, most, progress, networks(trained, fps))

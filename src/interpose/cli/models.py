@@ -16,7 +16,7 @@ METHODS = {
     "stmi-gan": "the spatio-temporal inpainting GAN of Hernandez Ruiz et al. 2019: forecasts, with samples",
     "small": "interpose's own network: gaps, lost joints and limbs, pins; any part of a pose is enough",
     "small-open": "the same network, of weights for any use, learned from CMU's data alone",
-    "cae": "the convolutional autoencoder of Kaufmann et al. 2020; best for long gaps",
+    "cae": "the convolutional autoencoder of Kaufmann et al. 2020: gaps from half a second to four",
 }
 
 

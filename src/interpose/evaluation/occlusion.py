@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from interpose.errors import unknown
+from interpose.errors import RequestError, unknown
 from interpose.evaluation.forecasters import thin
 from interpose.evaluation.forecasting import named
 from interpose.evaluation.table import markdown
@@ -74,10 +74,22 @@ def inpainting(card: Card) -> Row:
     return fill
 
 
+def sees(card: Card, rate: int) -> bool:
+    """Whether weights of STMI-GAN see a window frame by frame at that rate."""
+    return bool(card.training["network"]["frames"] == SECONDS * rate)
+
+
 def networks(cards: Sequence[Card], rate: int) -> dict[str, Row]:
-    """A row for each of some weights of STMI-GAN that see a window frame by frame, named as in table 1."""
-    seen = [card for card in cards if card.training["network"]["frames"] == SECONDS * rate]
-    return {name: inpainting(row.card) for name, row in named(seen).items() if row.card}
+    """A row for each of some weights of STMI-GAN, named as in table 1. RequestError for weights that do not
+    see a window frame by frame at that rate."""
+    for card in cards:
+        if not sees(card, rate):
+            raise RequestError(
+                f"cannot measure {card.path.parent}",
+                f"it sees {card.training['network']['frames']} frames, and windows have {SECONDS * rate}",
+                f"Add --fps {FPS if sees(card, FPS) else RATES[0]}.",
+            )
+    return {name: inpainting(row.card) for name, row in named(cards).items() if row.card}
 
 
 ROWS: dict[str, Row] = {"linear": linear, "kalman": kalman}

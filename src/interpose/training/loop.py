@@ -117,12 +117,14 @@ class Opponent:
 
 
 class Stop:
-    """Whether somebody asked to stop: SIGINT or SIGTERM. Once more, and the default happens."""
+    """Whether somebody asked to stop: SIGINT or SIGTERM. Once more, and what happened before happens."""
 
     def __init__(self) -> None:
         self.asked = False
         self._before: dict[int, Any] = {}
-        if threading.current_thread() is threading.main_thread():
+        # Of several processes one could stop a step before the others, which would wait for it.
+        alone = processes() == 1 and threading.current_thread() is threading.main_thread()
+        if alone:
             for number in (signal.SIGINT, signal.SIGTERM):
                 if signal.getsignal(number) is not signal.SIG_IGN:
                     self._before[number] = signal.signal(number, self._ask)
