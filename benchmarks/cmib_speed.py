@@ -2,21 +2,29 @@
 
     python benchmarks/cmib_speed.py
 
-The paper times a GPU, where a larger batch costs nearly nothing at first; on one CPU thread it costs in full.
+Beside it the autoregressive alternative: the recurrent network of `bench forecasting`, frame after frame. The
+paper times a GPU, where a larger batch costs nearly nothing at first; on one CPU thread it costs in full.
 """
 
 from __future__ import annotations
 
 import time
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from interpose.methods import weights
 
 BATCHES = (1, 2, 4, 8, 16, 32)
+LENGTHS = (30, 80)
+TIMES = 15
+RECURRENT = Path(__file__).parents[1] / "studies" / "seq2seq"
+
+Feed = dict[str, np.ndarray]
 
 
-def feed(batch: int, frames: int) -> dict[str, np.ndarray]:
+def feed(batch: int, frames: int) -> Feed:
     """Any motions of which the first and the last frame are keys."""
     rng = np.random.default_rng(0)
     rotation = rng.standard_normal((batch, frames, 22, 4)).astype(np.float32)
@@ -31,22 +39,43 @@ def feed(batch: int, frames: int) -> dict[str, np.ndarray]:
     }
 
 
+def at_once(session: Any, motions: Feed) -> None:
+    """All frames in one pass."""
+    session.run(None, motions)
+
+
+def step_by_step(session: Any, motions: Feed) -> None:
+    """Each frame from the one before."""
+    count, frames = motions["keys"].shape
+    units = next(one for one in session.get_inputs() if one.name == "state").shape[1]
+    rotation, state = motions["rotation"][:, 0], np.zeros((count, units), np.float32)
+    for _ in range(frames - 1):
+        inputs = {"rotation": rotation, "label": motions["label"], "state": state}
+        rotation, state = session.run(None, inputs)
+
+
+def milliseconds(run: Any, session: Any, motions: Feed) -> float:
+    """The median of several runs."""
+    run(session, motions)
+    spent = []
+    for _ in range(TIMES):
+        start = time.perf_counter()
+        run(session, motions)
+        spent.append(time.perf_counter() - start)
+    return 1000 * float(np.median(spent))
+
+
 def main() -> None:
-    session = weights.session(weights.find("cmib").onnx)
-    print("milliseconds (median of 9):")
-    print("batch  " + "  ".join(f"{frames} frames" for frames in (30, 80)))
+    cmib = weights.session(weights.find("cmib").onnx)
+    recurrent = weights.session(weights.load(RECURRENT, "seq2seq").onnx)
+    rows = [("CMIB", at_once, cmib), ("frame after frame", step_by_step, recurrent)]
+    columns = [(name, run, session, frames) for name, run, session in rows for frames in LENGTHS]
+    print(f"milliseconds (median of {TIMES}):")
+    print("batch  " + "  ".join(f"{name}, {frames} frames" for name, _, _, frames in columns))
     for batch in BATCHES:
-        row = []
-        for frames in (30, 80):
-            inputs = feed(batch, frames)
-            session.run(None, inputs)
-            spent = []
-            for _ in range(9):
-                start = time.perf_counter()
-                session.run(None, inputs)
-                spent.append(time.perf_counter() - start)
-            row.append(f"{1000 * float(np.median(spent)):9.1f}")
-        print(f"{batch:5}  " + "  ".join(row))
+        spent = [milliseconds(run, session, feed(batch, frames)) for _, run, session, frames in columns]
+        widths = [len(f"{name}, {frames} frames") for name, _, _, frames in columns]
+        print(f"{batch:5}  " + "  ".join(f"{ms:{width}.1f}" for ms, width in zip(spent, widths)))
 
 
 if __name__ == "__main__":

@@ -246,7 +246,10 @@ def test_training_learns_writes_figures_and_goes_on(pack, tmp_path):
 
 
 def test_the_graph_agrees_with_torch_at_other_sizes_and_training_goes_on_from_it(batch, tmp_path):
-    """Exported at 40 frames and two clips, run at 33 frames and one; weights come back within 16 bits."""
+    """Exported at 40 frames and two clips, run at 33 frames and one; weights come back within 16 bits.
+
+    What the graph says, in 8 bits, is off by less than a twentieth of what the network adds.
+    """
     import onnxruntime
 
     torch.manual_seed(2)
@@ -279,5 +282,8 @@ def test_the_graph_agrees_with_torch_at_other_sizes_and_training_goes_on_from_it
     expected, expected_turned = run(again, short, keys)
     assert (missed[0, [0, 11, 32]] > 0).all()
     assert (missed > 0).sum() == 3, "at keys only"
-    assert np.abs(placed - expected.numpy()).max() < 1e-3
-    assert rotations.angle(torch.from_numpy(turned), expected_turned).max() < 5e-3
+    torch.nn.init.zeros_(again.encoder.last.weight)
+    nothing, nothing_turned = run(again, short, keys)
+    assert np.abs(placed - expected.numpy()).max() < 0.05 * (expected - nothing).abs().max()
+    off = rotations.angle(torch.from_numpy(turned), expected_turned)
+    assert off.max() < 0.05 * rotations.angle(expected_turned, nothing_turned).max()
