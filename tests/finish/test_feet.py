@@ -115,13 +115,29 @@ def test_reach_never_stretches_and_keeps_the_foot(walk):
 def test_floors_need_not_be_flat():
     """A step up inside the gap: each side has the height of its own stances."""
     height = np.where(np.arange(120) < 60, 0.1, 0.4)
-    positions = np.stack([np.zeros(120), height, np.zeros(120)], -1)[:, None]
-    known = np.ones((120, 1), bool)
+    positions = np.stack([np.zeros(120), height, np.zeros(120)], -1)[:, None, None]
+    known = np.ones((120, 1, 1), bool)
     known[40:80] = False
-    floor = feet.local_floor(positions, known, 30.0)[:, 0]
+    floor = feet.local_floor(positions, known, 30.0)[:, 0, 0]
     assert floor[0] == pytest.approx(0.1)
     assert floor[119] == pytest.approx(0.4)
     assert 0.1 < floor[60] < 0.4
+
+
+@pytest.mark.parametrize("shown", [10, 1])
+def test_a_foot_in_the_air_tells_nothing_of_the_floor(walk, shown):
+    """Of a few known frames in which it is on its way: it rests where the other one does."""
+    joints = feet.pairs(walk.skeleton)
+    placed, whole = walk.positions()[:, joints], np.ones((len(walk), 2, 2), bool)
+    true = feet.local_floor(placed, whole, walk.fps)[60]
+    moving = measures.speed(placed, walk.fps).min(axis=2) > 0.8
+    swings = [run for leg in (0, 1) for run in runs(moving[:, leg]) if run[1] - run[0] >= 10]
+    assert swings
+    for start, _ in swings:
+        known = np.zeros_like(whole)
+        known[start : start + shown] = True
+        floor = feet.local_floor(placed, known, walk.fps)[start + shown // 2]
+        assert np.abs(floor - true).max() < 0.03
 
 
 def test_measures_of_feet():

@@ -84,16 +84,16 @@ def test_a_way_that_the_motion_does_not_walk_is_said(cmu_walk):
 
 
 def test_a_gap_that_a_simpler_method_filled_is_said_to_be_its(cmu_walk, data):
-    """Longer than `cae` fills: led, or with the arm of another clip in it, it is still the spline's."""
+    """None that `stmi-gan` fills: led, or with the arm of another clip in it, it is still the spline's."""
     gap, jump = (50, 150), interpose.load(data / "cmu_jump.bvh")
-    plain = interpose.fill(cmu_walk, gap, method="cae")
+    plain = interpose.fill(cmu_walk, gap, method="stmi-gan")
     (why,) = [note for note in plain.report.gaps[0].notes if "instead" in note]
     point = plain.clip.root[100, [0, 2]]
     part = interpose.Part(jump, 40, 48, 90, ("RightArm", "RightForeArm", "RightHand"))
     for done in (
-        interpose.fill(cmu_walk, gap, method="cae", path={100: point}),
-        interpose.fill(cmu_walk, gap, method="cae", parts=part),
-        interpose.fill(cmu_walk, gap, method="cae", parts=part, path={100: point}),
+        interpose.fill(cmu_walk, gap, method="stmi-gan", path={100: point}),
+        interpose.fill(cmu_walk, gap, method="stmi-gan", parts=part),
+        interpose.fill(cmu_walk, gap, method="stmi-gan", parts=part, path={100: point}),
     ):
         assert {one.method for one in done.report.gaps} == {"spline"}
         assert all(why.split(":")[0] in " ".join(one.notes) for one in done.report.gaps)

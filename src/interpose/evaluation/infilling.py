@@ -309,7 +309,7 @@ def _feet(result: Infilling, window: Window, clip: Clip, hidden: Observation, ga
     measured = feet.measure(clip, hidden, gap.start, gap.stop)
     if measured is None:
         return
-    part, joints = slice(gap.start, gap.stop), feet.ends(clip.skeleton)
+    part, joints = slice(gap.start, gap.stop), feet.pairs(clip.skeleton)
     truth = window.clip.positions()[:, joints]
     floor = feet.local_floor(truth, hidden.positions(clip.skeleton)[:, joints], clip.fps)
     stands = (measures.speed(truth, clip.fps) < feet.STILL) & (truth[..., 1] < floor + feet.HIGH)

@@ -33,7 +33,7 @@ BLENDS = (0.15, 0.25, 0.40)
 # which it clears the floor once it is twice as fast as QUICK (metres a second). A method that knows when feet
 # stand also knows how high they go: lifted as far as others' they slide half as much as people's do, at the
 # cost of more error than all else that is done to its motion. SOFT: the share of BLEND over which it comes.
-OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.015)
+OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.02)
 QUICK, SOFT = 0.50, 0.5
 # A contact that the method takes for less likely than this is none.
 LIKELY = 0.5
@@ -83,33 +83,49 @@ def size(skeleton: Skeleton) -> float:
     return length / LEG_LENGTH if np.isfinite(length) and length > 0 else 1.0
 
 
-def local_floor(positions: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
-    """(F, n) the height at which each joint rests: of observed stances, interpolated over what is missing.
+def pairs(skeleton: Skeleton) -> np.ndarray:
+    """(L, 2) ankle and toe of each leg that the skeleton has."""
+    return np.array([leg.foot for leg in legs(skeleton)], int).reshape(-1, 2)
 
-    positions: (F, n, 3) of ankles and toes; known: (F, n) where they are observed. On each side of a gap the
-    low end of the heights of slow feet within two seconds is taken (of all heights if none is slow).
+
+def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
+    """(F, L, 2) the height at which each ankle and toe rests: of observed stances, interpolated over what is
+    missing.
+
+    On each side of a gap the low end of the heights of the joint while it is slow, within two seconds. One
+    that is always on its way there rests where the same joint of another foot does, or, when none of them
+    stands, where the lowest of them is: what is known may be a single pose with a foot in the air.
+
+    Args:
+        feet: (F, L, 2, 3) ankles and toes of L legs.
+        known: (F, L, 2) where they are observed.
     """
-    frames, count = positions.shape[:2]
-    floor = np.empty((frames, count))
-    slow = measures.speed(positions, fps) < STILL
+    floor = np.empty(feet.shape[:3])
+    slow = measures.speed(feet, fps) < STILL
     near = max(1, round(NEARBY * fps))
-    for joint in range(count):
-        heights, seen = positions[:, joint, 1], known[:, joint]
-        if not seen.any():
-            floor[:, joint] = np.percentile(heights, 5)
-            continue
-        index = np.flatnonzero(seen)
-        breaks = np.flatnonzero(np.diff(index) > 1)
-        at, height = [], []
-        for part in np.split(index, breaks + 1):
-            for side, frames_there in ((part[0], part[:near]), (part[-1], part[-near:])):
-                still = frames_there[slow[frames_there, joint]]
-                lowest = heights[frames_there].min()
-                still = still[heights[still] < lowest + LEVEL]
+    for leg, end in np.ndindex(feet.shape[1:3]):
+        at, rests = [], []
+        for start, stop in runs(known[:, leg, end]):
+            for side, part in (
+                (start, slice(start, min(stop, start + near))),
+                (stop - 1, slice(max(start, stop - near), stop)),
+            ):
+                heights, seen, still = (some[part, :, end] for some in (feet[..., 1], known, slow))
                 at.append(side)
-                height.append(np.percentile(heights[still if len(still) else frames_there], 10))
-        floor[:, joint] = np.interp(np.arange(frames), at, height)
+                rests.append(_rest(heights, seen, still & seen, leg))
+        own = feet[:, leg, end, 1]
+        floor[:, leg, end] = np.interp(np.arange(len(feet)), at, rests) if at else np.percentile(own, 5)
     return floor
+
+
+def _rest(heights: np.ndarray, seen: np.ndarray, still: np.ndarray, leg: int) -> float:
+    """Where a leg's joint rests, by heights (n, L) of it and its like in other legs, all (n, L) arrays."""
+    lowest = np.where(seen, heights, np.inf).min(axis=0)
+    still = still & (heights < lowest + LEVEL)
+    if still[:, leg].any():
+        return float(np.percentile(heights[still[:, leg], leg], 10))
+    other = np.percentile(heights[still], 10) if still.any() else lowest.min()
+    return float(min(other, lowest[leg]))
 
 
 def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray:
@@ -138,14 +154,14 @@ def measure(clip: Clip, known: Observation, start: int, stop: int) -> tuple[floa
 
 def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -> list[tuple[float, float]]:
     """`measure` for several ranges (start, stop) at once; an empty list where there are no feet."""
-    feet = ends(clip.skeleton)
-    if not feet:
+    joints = pairs(clip.skeleton)
+    if not joints.size:
         return []
-    positions, grown = clip.positions()[:, feet], size(clip.skeleton)
-    floor = grown * local_floor(positions / grown, known.positions(clip.skeleton)[:, feet], clip.fps)
+    feet, grown = clip.positions()[:, joints], size(clip.skeleton)
+    floor = grown * local_floor(feet / grown, known.positions(clip.skeleton)[:, joints], clip.fps)
     parts = [slice(max(start - 1, 0), stop + 1) for start, stop in ranges]
-    slides = [measures.foot_slide(positions[part], clip.fps, floor[part]) for part in parts]
-    return list(zip(slides, [measures.foot_travel(positions[part]) for part in parts]))
+    slides = [measures.foot_slide(feet[part], clip.fps, floor[part]) for part in parts]
+    return list(zip(slides, [measures.foot_travel(feet[part]) for part in parts]))
 
 
 def plant(
@@ -170,23 +186,24 @@ def plant(
     """
     skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
-    joints = [[leg.thigh, leg.knee, leg.ankle] for leg in legs(skeleton)]
-    free = [np.asarray((~known.rotation[:, chain]).all(axis=1)) for chain in joints]
+    chains = [[leg.thigh, leg.knee, leg.ankle] for leg in legs(skeleton)]
+    free = [np.asarray((~known.rotation[:, chain]).all(axis=1)) for chain in chains]
     if not any(f[start:stop].any() for f in free):
         return clip
     sink, clear = OTHERS if stands is None else KNOWING
     rotation = clip.rotation.copy()
     turned, placed = clip.kinematics()
-    seen, grown = known.positions(skeleton), size(skeleton)
+    joints, grown = pairs(skeleton), size(skeleton)
+    # Seen as those of a body of usual size.
+    both = placed[:, joints] / grown
+    floors = local_floor(both, known.positions(skeleton)[:, joints], clip.fps)
     inside = np.zeros(len(clip), bool)
     inside[start:stop] = True
-    for leg, movable in zip(legs(skeleton), free):
+    for number, (leg, movable) in enumerate(zip(legs(skeleton), free)):
         movable = np.logical_and(movable, inside)
         if not movable.any():
             continue
-        # Seen as those of a body of usual size.
-        feet = placed[:, leg.foot] / grown
-        floor = local_floor(feet, seen[:, leg.foot], clip.fps)
+        feet, floor = both[:, number], floors[:, number]
         planted = contacts(feet, floor, clip.fps)
         if stands is not None:
             said = stands[:, 2 * leg.side : 2 * leg.side + 2]

@@ -46,6 +46,13 @@ FAR = 1.5
 FURTHER = 1.5
 # Frames solved at once.
 CHUNK = 4096
+# Metres a second squared by which velocities may jump inside of any gap: what a person does who sets off.
+SETS_OFF = 20.0
+# Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do; the
+# share of a gap beyond which that is no mending; and the jump (metres a second squared) that is mended even
+# where nothing tells how the motion itself jumps. Between poses that face away from each other networks may
+# turn all at once.
+MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
 # Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
 # beyond which they are not: that is a jump in value.
 ROUNDS, KINK = 6, 8.0
@@ -158,11 +165,13 @@ def complete(
     bounds = None if limit is None else _Bounds(limit, _peak_limit(hidden, known, limit))
     before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
     unheld: dict[Gap, tuple[float, float]] = {}
+    mended: dict[int, list[tuple[int, int]]] = {}
 
     def settle(chosen: list[_Span], source: Clip) -> None:
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
             _fade(current, source, hidden, known, span)
+            mended[span.start] = _mend(current, known, span, bounds)
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
             if source is not opinion or not (isinstance(method, Layer) and method.stands):
@@ -201,6 +210,10 @@ def complete(
     if isinstance(method, Layer) and method.pins:
         current = pins.meet(current, known, method.pins)
     for span in spans:
+        span.notes += [
+            f"a spline leads over frames {first + start} to {first + stop - 1}, where velocities jumped"
+            for start, stop in mended.get(span.start, ())
+        ]
         if above := _pop(current, known, span, bounds):
             span.notes.append(f"flagged: {above}")
 
@@ -477,7 +490,7 @@ def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
     Landings and kicks do so far beyond the limit of seams, so the observed motion around it is asked, too.
     """
     own = float(seams.own_jumps(hidden, known).max(initial=0.0))
-    return max(seams.PEAKS * limit, seams.OWN_PEAKS * own)
+    return max(seams.PEAKS * limit, seams.OWN_PEAKS * own, SETS_OFF / hidden.fps**2)
 
 
 def _excess(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> tuple[float, str]:
@@ -506,6 +519,53 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _
     raw = source.slice(lo, hi)
     if seams.difference(raw, base, seen, inner)[0] > seams.EXACT:
         _write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
+
+
+def _mend(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> list[tuple[int, int]]:
+    """Where velocities jump further inside of a span than they may, let a spline lead over the place.
+
+    Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
+    """
+    most = TORN / current.fps**2 if bounds is None else bounds.peak
+    lo, hi, (start, stop) = span.around(len(current), 3)
+    # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
+    frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
+    places = np.zeros(len(led), bool)
+    while frames.size:
+        jumps = np.linalg.norm(seams.jumps(led, seen, frames), axis=-1).max(axis=1)
+        if jumps.max() <= most:
+            break
+        led, (first, last) = _led_over(led, seen, (start, stop), int(frames[jumps.argmax()]), most)
+        again = places[first:last].all()
+        places[first:last] = True
+        if again or places.sum() > PATCHED * (stop - start):
+            return []
+    if places.any():
+        _write(current, led, span.start, (start, stop))
+    return [(lo + first, lo + last) for first, last in runs(places)]
+
+
+def _led_over(
+    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: float
+) -> tuple[Clip, tuple[int, int]]:
+    """The clip with a spline around the frame at which velocities jump worst, and over which frames: as few
+    of `inner` as bring the jump below `most`, or else those with which it is least."""
+    found = []
+    for seconds in MENDS:
+        half = max(1, round(seconds * clip.fps))
+        start, stop = max(inner[0], worst - half), min(inner[1], worst + half + 1)
+        free = np.zeros((len(clip), 1), bool)
+        free[start:stop] = True
+        if free.all():
+            break
+        done = Spline().complete(clip, Observation(known.rotation | ~free, known.translation | ~free)).clip
+        jump = _jump(done, known, np.arange(start - 1, stop + 1)) or 0.0
+        found.append((jump, done, (start, stop)))
+        if jump <= most:
+            break
+    if not found:
+        return clip, (worst, worst + 1)
+    return min(found, key=lambda one: one[0])[1:]
 
 
 def _plant(
