@@ -14,6 +14,7 @@ from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.finish import complete
+from interpose.finish.report import GapReport
 from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
@@ -396,3 +397,44 @@ def test_moments_beside_a_gap(cmu_walk):
     assert len(done.report.moments) > 10
     spoiled = noisy.with_motion(np.where(lost[..., None], [1.0, 0, 0, 0], noisy.rotation), noisy.translation)
     assert np.array_equal(tasks.fill(spoiled, observation).clip.rotation, done.clip.rotation)
+
+
+def test_a_path_through_a_gap_that_stays_open_is_refused(cmu_walk):
+    point = cmu_walk.root[50, [0, 2]]
+    with pytest.raises(RequestError, match="stays open: frame 50"):
+        tasks.fill(cmu_walk, [Gap(40, 60), Gap(90, 110)], "spline", only=[2], path={50: point})
+
+
+def test_what_several_methods_said_is_kept_apart_by_joint(cmu_walk):
+    """They speak of different joints; what a network says of feet and of its errors is not lost."""
+    gaps = [Gap(40, 60), Gap(90, 110)]
+    raw = tasks.fill(cmu_walk, gaps, methods={1: "kalman", 2: "cae"}).raw
+    alone = [tasks.fill(cmu_walk, gaps, name, only=[n]).raw for n, name in ((1, "kalman"), (2, "cae"))]
+    for one, part in zip(alone, (slice(40, 60), slice(90, 110))):
+        rows = [raw.joints.index(joint) for joint in one.joints]
+        np.testing.assert_allclose(raw.positions[part, rows], one.positions[part], atol=1e-6)
+    done = tasks.fill(cmu_walk, gaps, "small")
+    assert np.isfinite(done.raw.expected[40:60]).all()
+    assert np.isfinite(done.raw.stands[90:110]).all()
+    assert 100 * done.raw.expected[40:60].mean() == pytest.approx(done.report.gaps[0].expected)
+
+
+def test_reports_of_pieces_are_joined_whole():
+    """The worst of what must not be, means of what is a mean, and what only the second piece has."""
+    first = GapReport(0, 100, ("Head",), "small", 1, penetration=1.0, expected=2.0)
+    second = replace(first, start=90, stop=140, penetration=9.0, pins=3.0, expected=6.0)
+    (joined,) = tasks._joined([first, second])
+    assert (joined.start, joined.stop, joined.penetration, joined.pins) == (0, 140, 9.0, 3.0)
+    assert 2.0 < joined.expected < 6.0
+
+
+@pytest.mark.parametrize("fps", [60, 120])
+def test_a_network_says_of_every_new_frame_which_feet_stand(cmu_walk, fps):
+    """Beside seams, too, where frames of the clip lie between a known one of the network's and a new one."""
+    clip = resample(cmu_walk, fps)
+    start, stop = round(2 * fps), round(3 * fps)
+    fine = tasks.fill(clip, [Gap(start, stop)], "small").raw.stands[start:stop]
+    coarse = tasks.fill(cmu_walk, [Gap(60, 90)], "small").raw.stands[60:90]
+    step = fps // 30
+    assert np.abs(fine[::step] - coarse).max() < 0.35
+    assert np.abs(fine[:step] - coarse[0]).max() < 0.35, "nothing is mixed with what was never said"

@@ -113,6 +113,13 @@ def fill(
     whole, clip = clip, _handed(clip, observation)
     path_spans(clip, observation, path or ())
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
+    for frame in path or {}:
+        if any(job.method is None and job.gap.start <= frame < job.gap.stop for job in jobs):
+            raise RequestError(
+                f"the path leads through a gap that stays open: frame {frame}",
+                "the gap is longer than allowed, or not among the gaps chosen",
+                "Leave the point out, or let the gap be filled.",
+            )
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     provenance = np.zeros(rotation.shape[:2], np.int8)
     said: list[tuple[int, slice, Raw]] = []
@@ -608,11 +615,14 @@ def _joined(reports: list[GapReport]) -> list[GapReport]:
         share = (one.stop - last.stop) / (one.stop - last.start)
         worst = {
             name: _over(last, one, name, max)
-            for name in ("seam_before", "seam_after", "peak", "peak_limit", "bone_deviation")
+            for name in (
+                *("seam_before", "seam_after", "peak", "peak_limit", "bone_deviation"),
+                *("penetration", "path", "pins", "drift"),
+            )
         }
         means = {
             name: _over(last, one, name, lambda a, b, share=share: a + share * (b - a))
-            for name in ("solve_error", "foot_slide", "foot_slide_before")
+            for name in ("solve_error", "foot_slide", "foot_slide_before", "liveliness", "expected")
         }
         travel = _over(last, one, "foot_travel", lambda a, b: a + b)
         notes = tuple(dict.fromkeys(last.notes + one.notes))
@@ -629,14 +639,20 @@ def _over(one: GapReport, other: GapReport, name: str, combine: Callable[..., fl
 def _put_together(clip: Clip, said: list[tuple[int, slice, Raw]]) -> Raw:
     """What the methods said in their windows, as one; positions are NaN where none spoke of them."""
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
-    joints = next((raw.joints for _, _, raw in said if raw.positions is not None), ())
+    joints = tuple(sorted({joint for _, _, raw in said if raw.positions is not None for joint in raw.joints}))
     shape = (len(clip), len(joints), 3)
     positions, own = (np.full(shape, np.nan), np.full(shape, np.nan)) if joints else (None, None)
+    stands = np.full((len(clip), 4), np.nan) if any(raw.stands is not None for *_, raw in said) else None
+    expected = np.full(len(clip), np.nan) if any(raw.expected is not None for *_, raw in said) else None
     for start, inside, raw in said:
         part = slice(start, start + inside.stop - inside.start)
         rotation[part], translation[part] = raw.clip.rotation[inside], raw.clip.translation[inside]
         for whole, spoken in ((positions, raw.positions), (own, raw.own)):
             if whole is not None and spoken is not None:
-                whole[part] = spoken[inside]
+                whole[part, [joints.index(joint) for joint in raw.joints]] = spoken[inside]
+        if stands is not None and raw.stands is not None:
+            stands[part] = raw.stands[inside]
+        if expected is not None and raw.expected is not None:
+            expected[part] = raw.expected[inside]
     whole_clip = replace(clip, rotation=rotation, translation=translation, source=None)
-    return Raw(whole_clip, positions, joints, own=own)
+    return Raw(whole_clip, positions, joints, own=own, stands=stands, expected=expected)

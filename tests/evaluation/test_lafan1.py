@@ -169,3 +169,12 @@ def test_wrong_requests(published):
         lafan1.run(published, gaps=(300,))
     with pytest.raises(RequestError, match="unknown method"):
         lafan1.run(published, methods=("nothing",))
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS.values(), ids=PROTOCOLS)
+def test_every_length_fits_into_its_window(protocol):
+    for gap in range(3, 129):
+        length = protocol.window(gap)
+        assert protocol.hidden(gap)[1] < length, gap
+        assert protocol.judged(gap).stop <= length, gap
+        assert protocol.shown(gap).stop <= length, gap

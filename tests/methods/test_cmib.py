@@ -8,7 +8,9 @@ import pytest
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.methods import registry
+from interpose.geometry.time import resample
+from interpose.methods import cmib, registry
+from interpose.methods.bodies import observed_body
 from interpose.methods.cmib import passes
 from interpose.observation import Gap, Observation
 
@@ -81,3 +83,24 @@ def test_keys_that_contradict_the_action_are_told(cmu_walk):
     assert remarks(cmu_walk, "walk") == {}
     assert "contradict" in remarks(far, "walk")["21:50"][0]
     assert remarks(far, "") == {}
+
+
+def test_keys_closer_than_the_grid_do_not_take_each_other_s_place(cmu_walk, monkeypatch):
+    """At 120 fps keys 10 and 12 fall on one frame of the network's: the first key is the one that it gets."""
+    given = {}
+
+    def run(path, positions, rotation, keys, *rest):  # type: ignore[no-untyped-def]
+        given["hips"], given["keys"] = positions[:, 0], keys
+        return ran(path, positions, rotation, keys, *rest)
+
+    ran = cmib.run
+    monkeypatch.setattr(cmib, "run", run)
+    clip = resample(cmu_walk, 120)
+    seen = Observation.from_gaps(clip, [Gap(11, 12), Gap(13, 26)])
+    said = registry.get("cmib").complete(clip, seen).clip
+    assert given["keys"].sum() == 2
+    way = np.linalg.norm(np.diff(given["hips"][[0, -1]], axis=0))
+    true = np.linalg.norm(clip.root[26] - clip.root[10])
+    body = observed_body(clip, seen)
+    assert way == pytest.approx(true * body.scale, rel=1e-3)
+    assert np.linalg.norm(said.root[13:26] - clip.root[13:26], axis=-1).max() < 0.1

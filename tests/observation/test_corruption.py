@@ -6,15 +6,11 @@ import numpy as np
 import pytest
 
 from interpose.observation import corruption
-from interpose.skeletons import JOINTS
 
 MASKS = {
     "gap": lambda rng: corruption.gap_mask(rng, 50, 40, 22, 10, 4),
-    "gaps": lambda rng: corruption.gaps_mask(rng, 50, 40, 22, 6, 2),
     "joints": lambda rng: corruption.joints_mask(rng, 50, 40, 22),
     "joints per frame": lambda rng: corruption.joints_per_frame_mask(rng, 50, 40, 22, 0.3),
-    "limb": lambda rng: corruption.limb_mask(rng, 50, 40),
-    "frames": lambda rng: corruption.frames_mask(rng, 50, 40, 22, 0.3),
     "occluded joints": lambda rng: corruption.occluded_joints_mask(rng, 50, 40, 22, 0.8),
     "occluded chains": lambda rng: corruption.occluded_chains_mask(rng, 50, 40, 22, 0.8, per_frame=True),
     "missing frames": lambda rng: corruption.missing_frames_mask(rng, 50, 40, 22, 0.8),
@@ -32,14 +28,14 @@ def test_masks_are_seeded_and_miss_something(name):
     assert not (mask == mask[:1]).all()
 
 
-@pytest.mark.parametrize("name", ["gap", "gaps", "frames", "missing frames"])
+@pytest.mark.parametrize("name", ["gap", "missing frames"])
 def test_whole_poses_go_and_the_ends_stay(name):
     mask = MASKS[name](np.random.default_rng(1))
     assert (mask == mask[:, :, :1]).all()
     assert mask[:, [0, -1]].all()
 
 
-@pytest.mark.parametrize("name", ["joints", "limb", "joints per frame"])
+@pytest.mark.parametrize("name", ["joints", "joints per frame"])
 def test_the_root_stays(name):
     assert MASKS[name](np.random.default_rng(1))[:, :, 0].all()
 
@@ -73,21 +69,9 @@ def test_one_to_three_whole_joints_are_missing():
     assert (~mask[:, 0, 1:]).any(axis=0).all(), "any joint can go"
 
 
-def test_joints_and_frames_go_with_their_probability():
+def test_joints_go_with_their_probability():
     joints = corruption.joints_per_frame_mask(np.random.default_rng(0), 20, 100, 22, 0.3)
     assert abs((~joints[:, :, 1:]).mean() - 0.3) < 0.01
-    frames = corruption.frames_mask(np.random.default_rng(0), 200, 100, 2, 0.3)
-    assert abs((~frames[:, 1:-1]).mean() - 0.3) < 0.01
-
-
-def test_limbs_are_whole_arms_and_legs():
-    mask = corruption.limb_mask(np.random.default_rng(0), 200, 3)
-    gone = {tuple(JOINTS[j] for j in np.flatnonzero(~clip[0])) for clip in mask}
-    assert gone == {
-        tuple(side + part for part in parts)
-        for side in ("Left", "Right")
-        for parts in (("UpLeg", "Leg", "Foot", "Toe"), ("Shoulder", "Arm", "ForeArm", "Hand"))
-    }
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])

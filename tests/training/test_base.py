@@ -16,12 +16,33 @@ from interpose.geometry import kinematics, rotations  # noqa: E402
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods import base as method  # noqa: E402
 from interpose.methods import registry, weights  # noqa: E402
-from interpose.models.base import CONFIGS, COUNT, Base, BaseConfig, complete_columns, room  # noqa: E402
+from interpose.models.base import (  # noqa: E402
+    CONFIGS,
+    COUNT,
+    FEET,
+    Answer,
+    Base,
+    BaseConfig,
+    Motion,
+    complete_columns,
+    room,
+)
 from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
 from interpose.training import export  # noqa: E402
-from interpose.training.base import TASKS, BaseSettings, chosen, draw_task, train_base  # noqa: E402
+from interpose.training.base import (  # noqa: E402
+    JUDGED,
+    STANDS,
+    TASKS,
+    BaseSettings,
+    Losses,
+    chosen,
+    draw_task,
+    spoil,
+    train_base,
+    validate,
+)
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.export import export_base  # noqa: E402
 from interpose.training.loop import restore, shard_paths  # noqa: E402
@@ -179,6 +200,9 @@ def test_clips_that_are_shorter_than_gaps_may_be(walk_pack, drawn, tmp_path):
     pack = walk_pack("lafan1", both=True)
     long_ones = BaseSettings(width=24, layers=1, batch=2, longest=2000, short=-8.0)
     train_base([pack], tmp_path, Budget.parse("2steps"), long_ones, say=lambda line: None)
+    assert export_base(tmp_path, [pack], tmp_path / "weights", ["train"]).max_gap == 172, (
+        "of 192 that it sees"
+    )
     poses = Poses([pack], ("train",), ("",), 40, torch.device("cpu"))
     with pytest.raises(RequestError, match="no clip is long enough to learn from 2000 frames"):
         poses.draw(np.random.default_rng(0), 2, 2000)
@@ -276,3 +300,74 @@ def test_knowledge_of_canonical_rotations(cmu_walk):
     assert known[5:9, np.arange(COUNT + 1) != row].all()
     assert not known[20:22][:, [*mapping.mapped[0], COUNT]].any()
     assert known[22:].all()
+
+
+def test_losses_are_of_what_is_wrong(drawn):
+    """Nothing for the truth; each grows with what it is about; the risk is least at the error itself."""
+    local = kinematics.local_rotations(drawn.rotation, PARENTS)
+    known = torch.ones(2, 40, COUNT + 1)
+    known[:, 10:30] = 0
+    placed, losses = drawn.positions(), Losses(BaseSettings())
+
+    def parts(shift=0.0, turned=0.0, risk=0.0, contact=0.0):  # type: ignore[no-untyped-def]
+        angle = torch.full((2, 40, COUNT, 1), turned) * torch.tensor([0.0, 0.0, 1.0])
+        time = torch.arange(40.0)[:, None] * torch.tensor([1.0, 0.0, 0.0])
+        motion = Motion(rotations.multiply(local, rotations.exp(angle)), drawn.root + shift * time)
+        stands = (placed[:, :, list(FEET)].diff(dim=1).norm(dim=-1) < STANDS).float()
+        said = torch.nn.functional.pad(contact * (2 * stands - 1), (0, 0, 1, 0))
+        answer = Answer(motion, said, torch.full((2, 40), risk))
+        found = losses.parts(answer, drawn.rotation, placed, known, drawn.bones)
+        return {name: float(value) for name, value in found.items()}
+
+    true = parts()
+    assert max(true[name] for name in ("position", "rotation", "velocity")) < 1e-5
+    for name in ("position", "velocity", "slide"):
+        assert parts(shift=0.02)[name] > parts(shift=0.01)[name] > true[name] + 1e-4, name
+    assert parts(turned=0.2)["rotation"] > parts(turned=0.1)["rotation"] > 0.01
+    assert parts(contact=5.0)["contact"] < true["contact"] < parts(contact=-5.0)["contact"]
+    off = (parts(shift=0.001)["position"]) / 1.5  # of joints, and half as much of the hips
+    best = float(np.log(100 * off))
+    least = parts(shift=0.001, risk=best)["risk"]
+    assert least < parts(shift=0.001, risk=best - 1)["risk"]
+    assert least < parts(shift=0.001, risk=best + 1)["risk"]
+
+
+def test_noise_is_in_what_is_noisy_alone(drawn):
+    given = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
+    noisy = spoil(given, torch.tensor([True, False]), 0.06, 3)
+    moved, turned = (noisy.root - given.root).abs(), rotations.angle(noisy.local, given.local)
+    assert moved[0].mean() > 1e-5
+    assert turned[0].mean() > 10 * turned[1].max()
+    assert moved[1].max() == 0
+
+
+def test_straight_lines_are_as_good_as_straight_lines(walk_pack):
+    """What validation compares with: a network that says nothing, and starts from lines."""
+    pack = walk_pack("lafan1", both=True)
+    poses = Poses([pack], ("train",), labels_of([pack], ("train",)), 60, torch.device("cpu"))
+    batch = poses.spread(2, JUDGED)
+    plain = Base(BaseConfig(("", "walk"), width=24, heads=2, layers=1, velocities=False))
+    figures = validate(plain.eval(), batch)
+    for gap in (5, 15, 30, 45):
+        assert figures[f"ratio{gap}"] == pytest.approx(1, abs=1e-4)
+        assert figures[f"turn_ratio{gap}"] == pytest.approx(1, abs=1e-3)
+    with torch.no_grad():
+        plain.encoder.say.bias[6 * COUNT] = 0.1  # its hips are 10 cm aside
+    assert validate(plain, batch)["ratio15"] > 1.05
+
+
+def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path):
+    pack = walk_pack("lafan1", both=True)
+    wired = BaseSettings(width=24, layers=1, batch=2, longest=40, near=0, velocities=0, every_seconds=1e9)
+    train_base([pack], tmp_path / "first", Budget.parse("1steps"), wired)
+    export_base(tmp_path / "first", [pack], tmp_path / "weights", ["train"])
+    card = weights.load(tmp_path / "weights", "small")
+    plain = BaseSettings(batch=2, longest=40, every_seconds=1e9)
+    train_base([pack], tmp_path / "second", Budget.parse("1steps"), plain, start=card)
+    network = json.loads((tmp_path / "second" / "settings.json").read_text())["network"]
+    assert (network["width"], network["layers"], network["near"], network["velocities"]) == (
+        24,
+        1,
+        False,
+        False,
+    )

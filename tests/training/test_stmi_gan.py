@@ -101,6 +101,33 @@ def test_bones_that_are_too_long_cost_everywhere(windows):
     assert float(play.told(Motions(truth, observed, moved))) < 0.01
 
 
+def test_each_side_gains_by_what_is_worse_for_the_other(windows, monkeypatch):
+    """A judge that takes motions for the data's by the sign of their coordinates."""
+
+    class Judge:
+        def __init__(self, right: float) -> None:
+            self.right = right
+
+        def seen(self, motion):  # type: ignore[no-untyped-def]
+            return motion
+
+        def __call__(self, motion):  # type: ignore[no-untyped-def]
+            return self.right * motion.mean(dim=(1, 2, 3))
+
+    play = game(windows, gamma=0.0, reconstruction=0.0, limbs=0.0, bones=0.0)
+    shape = draw(np.random.default_rng(0), windows, play.settings, 2).shape
+    motions = Motions(torch.ones(shape), torch.ones(shape, dtype=torch.bool), -torch.ones(shape))
+    monkeypatch.setattr(play, "play", lambda rng: motions)
+    found = []
+    for right in (5.0, -5.0):
+        play.discriminator = Judge(right)
+        rng = np.random.default_rng(0)
+        found.append((float(play.opponent_loss(rng, 0.0)), float(play.loss(rng, 0.0))))
+    (judge_right, maker_right), (judge_wrong, maker_wrong) = found
+    assert judge_right < 0.1 < judge_wrong
+    assert maker_wrong < 1.0 < maker_right
+
+
 def test_the_penalty_reaches_every_branch(windows):
     """R1 needs gradients of gradients: those of the penalty alone must move all branches."""
     play = game(windows, every=1)

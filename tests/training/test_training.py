@@ -33,6 +33,7 @@ from interpose.training.cae import (  # noqa: E402
 )
 from interpose.training.deconvolution import quicken  # noqa: E402
 from interpose.training.export import export_cae  # noqa: E402
+from interpose.training.loop import Settings, Trainer  # noqa: E402
 from interpose.training.windows import Windows  # noqa: E402
 
 
@@ -49,7 +50,7 @@ def test_budgets(text, seconds, steps):
     assert (budget.seconds, budget.steps) == (seconds, steps)
 
 
-@pytest.mark.parametrize("text", ["", "25", "m", "-3h", "0s", "3 weeks"])
+@pytest.mark.parametrize("text", ["", "25", "m", "-3h", "0s", "3 weeks", "0.5steps"])
 def test_budgets_that_are_none(text):
     with pytest.raises(RequestError, match="--budget 25m"):
         Budget.parse(text)
@@ -310,3 +311,51 @@ def test_gradients_of_narrow_deconvolutions_do_not_depend_on_what_lies_in_memory
             layer(image).float().square().mean().backward()
         found.append(image.grad)
     assert torch.allclose(found[0], found[1], atol=0.02 * float(found[0].abs().max()))
+
+
+def test_the_rate_warms_up_and_falls_and_the_average_follows(pack, tmp_path):
+    """Half a cosine over the budget; the average of what the weights were, of the last ones most."""
+    model = torch.nn.Linear(1, 1, bias=False)
+    torch.nn.init.zeros_(model.weight)
+    rates, held = [], []
+
+    def loss(rng, fraction):  # type: ignore[no-untyped-def]
+        rates.append(trainer.optimizer.param_groups[0]["lr"])
+        held.append(float(model.weight.detach()))
+        return -model.weight.sum()
+
+    settings = Settings(learning_rate=0.5, warm_up=0.1, average=0.9, every_seconds=1e9)
+    optimizer = lambda some: torch.optim.SGD(some, 0.5)  # noqa: E731
+    budget = Budget.parse("100steps")
+    trainer = Trainer(
+        model, loss, lambda averaged: {}, tmp_path, budget, settings, lambda line: None, optimizer=optimizer
+    )
+    averaged = trainer.run()
+    assert rates[0] < 0.01
+    assert rates[5] == pytest.approx(0.5 * 0.5 * 0.5 * (1 + np.cos(0.05 * np.pi)))
+    assert rates[50] == pytest.approx(0.25)
+    assert rates[99] < 0.001
+    steps = np.diff([*held, float(model.weight.detach())])
+    np.testing.assert_allclose(steps, rates, rtol=1e-3, atol=1e-5)
+    mean = 0.0
+    for step, value in enumerate([*held[1:], float(model.weight.detach())], 1):
+        keep = min(0.9, (1 + step) / (10 + step))
+        mean = keep * mean + (1 - keep) * value
+    assert float(averaged.weight) == pytest.approx(mean, rel=1e-4)
+
+
+def test_a_warm_up_that_is_none():
+    with pytest.raises(RequestError, match="cannot warm up"):
+        Settings(warm_up=0.0)
+
+
+def test_a_failure_leaves_ctrl_c_as_it_was(pack, tmp_path):
+    def loss(rng, fraction):  # type: ignore[no-untyped-def]
+        raise ArithmeticError
+
+    before = signal.getsignal(signal.SIGINT)
+    model = torch.nn.Linear(1, 1)
+    run = Trainer(model, loss, lambda m: {}, tmp_path, Budget.parse("1steps"), Settings(), lambda line: None)
+    with pytest.raises(ArithmeticError):
+        run.run()
+    assert signal.getsignal(signal.SIGINT) is before

@@ -154,7 +154,7 @@ def own(
             f"it belongs to {begin.method}; so far only interpose's own networks can",
             "Write --from small.",
         )
-    if (out / f"{begin.name}.onnx").exists():
+    if any(out.glob("*.onnx")):
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
     asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
     # Gently: what it knows of all motion is to stay.

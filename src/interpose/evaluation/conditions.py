@@ -87,7 +87,11 @@ def representations(
         "(and in brackets how many core hours it was trained):",
         [f"{length} frames" for length in LENGTHS],
     )
-    methods = {"interpolation": None} | {_name(card): Cmib("", card) for card in trained}
+    methods: dict[str, Cmib | None] = {"interpolation": None}
+    for card in trained:
+        # Two that were trained alike: the folder tells them apart.
+        name = _name(card)
+        methods[f"{name}, {card.path.parent}" if name in methods else name] = Cmib("", card)
     for done, (name, method) in enumerate(methods.items()):
         progress(done / len(methods), name)
         table.rows[name] = []
@@ -134,7 +138,7 @@ def anchors(
     )
     for done, card in enumerate(trained):
         augmented = card.training.get("augmented", 0.0)
-        name = f"{card.path.parent.name or card.name}, {'with' if augmented else 'without'} augmentation"
+        name = f"{card.path.parent}, {'with' if augmented else 'without'} augmentation"
         table.rows[name] = []
         for frame in ANCHORS:
             progress((done + frame / ANCHORED) / len(trained), name)

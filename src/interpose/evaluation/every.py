@@ -178,7 +178,7 @@ def run(
                 filled = complete(clip, hidden.observation, method)
                 off = np.linalg.norm(window.canonical(filled.clip) - truth, axis=-1)
                 result.errors[task][name].append(100 * float(off[hidden.judged].mean()))
-                if any(gap.method != name for gap in filled.report.gaps):
+                if any(gap.method != method.name for gap in filled.report.gaps):
                     result.fell[task][name] += 1
         progress((done + 1) / len(held), f"{done + 1} of {len(held)} windows")
     return result

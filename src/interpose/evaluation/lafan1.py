@@ -64,7 +64,7 @@ class Protocol:
     def window(self, gap: int) -> int:
         """The length of test windows."""
         if self.keys_count:
-            return 65 if gap < 60 else gap + 10
+            return 65 if gap <= 55 else gap + 10
         return 65 if gap <= 50 else 140
 
     def hidden(self, gap: int) -> tuple[int, int]:
@@ -177,6 +177,14 @@ def load(data: Path, split: str, progress: Callable[[str], None] = lambda line: 
     """Read the data set. `split`: "test" (subject 5) or "validation" (subject 4)."""
     entries = [entry for entry in clips("lafan1", data) if not entry.trains_only]
     training = [entry for entry in entries if entry.split != "test"]
+    chosen = [entry for entry in entries if entry.split == split]
+    for what, found in (("training", training), (split, chosen)):
+        if not found:
+            raise RequestError(
+                "there is nothing to measure with",
+                f"{data} holds no sequences of LAFAN1's {what} performers",
+                "Unpack the whole data set there: docs/data.md.",
+            )
     progress(f"lafan1: reading {len(training)} sequences for the statistics")
     known = [entry.load() for entry in training]
     # Bones of the first training frame serve everyone, the test's truth included.
@@ -190,7 +198,6 @@ def load(data: Path, split: str, progress: Callable[[str], None] = lambda line: 
         sums, squares, count = sums + flat.sum(axis=0), squares + (flat**2).sum(axis=0), count + len(flat)
     mean = sums / count
     statistics = Statistics(mean, np.sqrt(squares / count - mean**2))
-    chosen = [entry for entry in entries if entry.split == split]
     progress(f"lafan1: reading {len(chosen)} sequences of the {split} performer")
     sequences = [entry.load() for entry in chosen]
     whole = split == "test" and len(chosen) == WHOLE

@@ -31,8 +31,8 @@ STILL, LEVEL = 0.30, 0.08
 BLENDS = (0.15, 0.25, 0.40)
 # Metres that a foot may sink below the lowest stances nearby (the bound is rounded off over as much), and by
 # which it clears the floor once it is twice as fast as QUICK (metres a second). A method that knows when feet
-# stand also knows how high they go: lifted as far as others' they slide half as much as people's do, at the
-# cost of more error than all else that is done to its motion. SOFT: the share of BLEND over which it comes.
+# stand also knows how high they go: lifted as far as others' they slide half as much as people's do, and are
+# off by a hundredth more. SOFT: the share of BLEND over which it comes.
 OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.02)
 QUICK, SOFT = 0.50, 0.5
 # A contact that the method takes for less likely than this is none.

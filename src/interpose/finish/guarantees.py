@@ -661,8 +661,9 @@ def _report(
     never = [] if own and "model" in raw.notes else _never(known, gap, skeleton.names)
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
     # It speaks of all joints: where most of them are known it would mislead.
-    whole = gap.joints is None and own and raw.expected is not None
-    risk = raw.expected[gap.start : gap.stop] if whole and raw.expected is not None else None
+    risk = raw.expected[gap.start : gap.stop] if raw.expected is not None else None
+    if gap.joints is not None or not own or risk is None or not np.isfinite(risk).all():
+        risk = None
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,

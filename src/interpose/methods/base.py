@@ -109,8 +109,8 @@ class Answer:
     Attributes:
         local: (T, 22, 4) canonical rotations relative to the parent's; float64.
         root: (T, 3) metres, the hips.
-        stands: (T, 4) how likely ankles and toes stand, 0 to 1.
-        expected: (T,) metres that joints are expected to be off.
+        stands: (T, 4) how likely ankles and toes stand, 0 to 1, or NaN.
+        expected: (T,) metres that joints are expected to be off, or NaN.
     """
 
     local: np.ndarray
@@ -216,10 +216,11 @@ def run_long(
     """Run the graph on a motion of any length, hole by hole; arguments and result as in `run`.
 
     A hole is seen with what is around it. Of one that is longer than the network can see, each window
-    completes as much as half of it, which is taken as known from then on.
+    completes as much as half of it, which is taken as known from then on. What it says of feet and of errors
+    it also says of the known frames around; far from any hole nothing does (NaN).
     """
     local, root, known = local.copy(), root.copy(), known.copy()
-    stands, expected = np.zeros((len(root), len(FEET))), np.zeros(len(root))
+    stands, expected = np.full((len(root), len(FEET)), np.nan), np.full(len(root), np.nan)
     for begin, end in runs(np.logical_not(known.all(axis=1))):
         while begin < end:
             short = end - begin <= card.max_gap
@@ -235,7 +236,9 @@ def run_long(
             held = known[inside]
             local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
             root[inside] = np.where(held[:, -1:], root[inside], said.root[own])
-            stands[inside], expected[inside] = said.stands[own], said.expected[own]
+            for held_back, new in ((stands, said.stands), (expected, said.expected)):
+                held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
+                held_back[inside] = new[own]
             known[inside] = True
             begin = stop
     return Answer(local, root, stands, expected)

@@ -127,10 +127,18 @@ class Cmib:
             count = max(3, round((last - first) / step) + 1)
             scale = (count - 1) / (last - first)
             slots = np.rint((np.array(keys) - first) * scale).astype(int)
+            # Keys closer than the grid: the first of them, but for the last one, counts.
+            kept = np.unique(slots, return_index=True)[1]
+            kept[-1] = len(slots) - 1
             known = np.zeros(count, bool)
             positions = np.zeros((count, *placed.shape[1:]))
             rotation = np.tile([1.0, 0.0, 0.0, 0.0], (count, turned.shape[1], 1))
-            known[slots], positions[slots], rotation[slots] = True, placed[keys], turned[keys]
+            poses = np.array(keys)[kept]
+            known[slots[kept]], positions[slots[kept]], rotation[slots[kept]] = (
+                True,
+                placed[poses],
+                turned[poses],
+            )
             hips, said, off = run(card.onnx, positions, rotation, known, label, lengths)
             missed |= {key: float(off[slot] / body.scale) for key, slot in zip(keys, slots)}
             for a, b in zip(keys, keys[1:]):

@@ -1,7 +1,7 @@
-"""The protocol of a method, and the one place where a clip is completed.
+"""The protocol of a method, and what it returns.
 
 A method sees a clip in which unobserved values are already wiped (replaced by the linear completion), so
-that nothing can leak, and returns its raw completion. `complete` then enforces the guarantees.
+that nothing can leak, and returns its raw completion. `finish.complete` then enforces the guarantees.
 """
 
 from __future__ import annotations

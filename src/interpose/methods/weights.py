@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -76,7 +77,10 @@ class Card:
         return {name: value for name, value in asdict(self).items() if name != "path"}
 
     def save(self, path: Path) -> None:
-        path.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
+        """Write the card, whole or not at all."""
+        new = path.with_suffix(".new")
+        new.write_text(json.dumps(self.to_dict(), indent=2) + "\n")
+        os.replace(new, path)
 
     @classmethod
     def load(cls, path: Path) -> Card:

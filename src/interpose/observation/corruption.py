@@ -55,17 +55,6 @@ def joints_mask(
     return np.repeat(known[:, None, :], frames, axis=1)
 
 
-def gaps_mask(
-    rng: np.random.Generator, batch: int, frames: int, joints: int, mean: float, sigma: float, most: int = 3
-) -> np.ndarray:
-    """One to `most` gaps of whole poses per clip, each as in `gap_mask`; they may touch or overlap."""
-    count = rng.integers(1, most + 1, batch)
-    known = np.ones((batch, frames, joints), bool)
-    for i in range(most):
-        known &= gap_mask(rng, batch, frames, joints, mean, sigma) | (count <= i)[:, None, None]
-    return known
-
-
 def joints_per_frame_mask(
     rng: np.random.Generator, batch: int, frames: int, joints: int, probability: float
 ) -> np.ndarray:
@@ -76,29 +65,6 @@ def joints_per_frame_mask(
     known = rng.random((batch, frames, joints), dtype=np.float32) >= probability
     known[:, :, 0] = True
     return known
-
-
-def limb_mask(
-    rng: np.random.Generator,
-    batch: int,
-    frames: int,
-    joints: int = len(JOINTS),
-    limbs: Sequence[Sequence[int]] = LIMBS,
-) -> np.ndarray:
-    """One of the `limbs` (joint indices) per clip missing over all its frames."""
-    table = np.ones((len(limbs), joints), bool)
-    for row, limb in zip(table, limbs):
-        row[list(limb)] = False
-    return np.repeat(table[rng.integers(len(limbs), size=batch)][:, None, :], frames, axis=1)
-
-
-def frames_mask(
-    rng: np.random.Generator, batch: int, frames: int, joints: int, probability: float
-) -> np.ndarray:
-    """Each whole frame but the first and last missing with `probability`, independently."""
-    known = rng.random((batch, frames), dtype=np.float32) >= probability
-    known[:, [0, -1]] = True
-    return np.repeat(known[:, :, None], joints, axis=2)
 
 
 def occluded_joints_mask(

@@ -95,6 +95,7 @@ class BaseSettings(Settings):
     risk: float = 0.02
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.config not in CONFIGS:
             raise unknown("config", self.config, CONFIGS)
         if self.tasks not in TASKS:
@@ -296,12 +297,17 @@ def train_base(
     poses = Poses(kept, splits, labels, SHORTEST, device)
     # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
-    model = Base(settings.network(labels)).to(device)
+    network = settings.network(labels)
+    if start:  # what it is wired like has no weights of its own that could tell
+        network = BaseConfig(**{**start.training["network"], "labels": labels, "dropout": settings.dropout})
+    model = Base(network).to(device)
     if start:
         restore(model, start.onnx)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
-    # Where all clips are short, as a user's own may be, gaps are drawn no longer than fit into them.
-    fit = max(1, min(settings.longest, int(poses.counts.max()) - 2 * settings.context))
+    # No longer than the network can see with what is around them; nor, where all clips are short, as a user's
+    # own may be, than fit into them.
+    room = min(network.longest, int(poses.counts.max())) - 2 * settings.context
+    fit = max(1, min(settings.longest, room))
     drawing = replace(settings, longest=fit)
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:

@@ -34,7 +34,8 @@ class Budget:
     def parse(cls, text: str) -> Budget:
         """ "25m", "3h", "90s" or "6000steps"; RequestError for anything else."""
         match = re.fullmatch(r"(\d+(?:\.\d+)?)\s*(s|m|h|steps)", text.strip())
-        if not match or float(match[1]) <= 0:
+        whole = match is None or match[2] != "steps" or float(match[1]).is_integer()
+        if not match or float(match[1]) <= 0 or not whole:
             raise RequestError(
                 f"cannot read the budget {text!r}",
                 "a budget is an amount of device time or a number of steps",

@@ -70,6 +70,7 @@ class CaeSettings(Settings):
     noise: float = 0.0  # share of the clips that are whole but noisy, or lose joints frame by frame
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.network not in NETWORKS:
             raise unknown("network", self.network, NETWORKS)
         if self.loss not in LOSSES:

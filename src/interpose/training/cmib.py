@@ -11,6 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from interpose.datasets import Pack
+from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
@@ -121,6 +122,12 @@ def train_cmib(
     """Train, or go on training, in `folder`; the averaged model comes back. Arguments as in `train_cae`."""
     settings = settings or CmibSettings()
     device = pick_device()
+    if settings.longest > CmibConfig().longest:
+        raise RequestError(
+            f"cannot learn from {settings.longest} frames",
+            f"the network sees {CmibConfig().longest} at once",
+            "Choose --set longest=131 or less.",
+        )
     torch.manual_seed(settings.seed)
     before = tuple(start.labels) if start else ()
     labels = before + tuple(label for label in labels_of(packs, splits) if label not in before)

@@ -326,6 +326,7 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
     """Write `seq2seq.onnx`, `seq2seq.json`, the log and its curves into `out` from a run's folder."""
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     config = settings.pop("config")
+    _check_free(out, "seq2seq")
     model = Seq2Seq(Seq2SeqConfig(**{**config, "labels": tuple(config["labels"])}))
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)
@@ -371,6 +372,7 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
     """Write `cmib.onnx`, `cmib.json`, the training log and its curves into `out` from a run's folder."""
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     config = settings.pop("config")
+    _check_free(out, "cmib")
     model = Cmib(CmibConfig(**{**config, "labels": tuple(config["labels"])}))
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)
@@ -402,6 +404,7 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder."""
     settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
     config = StmiGanConfig.of(settings["network"])
+    _check_free(out, "stmi-gan")
     model = Generator(config)
     model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
     out.mkdir(parents=True, exist_ok=True)
@@ -463,7 +466,7 @@ def export_base(
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
         fps=30.0,
-        max_gap=settings["longest"],
+        max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
         training={**_training("base", settings, splits, log, earlier, model), "network": network},
         metrics={"validation": log[-1]},
         auto=auto,
@@ -529,7 +532,11 @@ def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ..
     hours = [entry["hours"] for entry in log]
     loss = {"loss": (hours, [entry["loss"] for entry in log])}
     line_plot(loss, "device hours", unit, f"Training of {name}", path=out / "loss.svg")
-    errors = {f"gap of {gap} frames": (hours, [entry[f"gap{gap}"] for entry in log]) for gap in gaps}
+    errors = {
+        f"gap of {gap} frames": (hours, [entry[f"gap{gap}"] for entry in log])
+        for gap in gaps
+        if f"gap{gap}" in log[-1]
+    }
     line_plot(errors, "device hours", "joint error, cm", "Validation performers", path=out / "validation.svg")
 
 
@@ -548,7 +555,7 @@ def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], 
     if not (folder / "earlier.json").exists():
         return lines("log.jsonl"), [], {"from_gap": 61}
     before = lines("earlier.jsonl")
-    steps, hours = before[-1]["step"], before[-1]["hours"]
+    steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
     after = [
         {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
         for entry in lines("log.jsonl")

@@ -22,7 +22,7 @@ import torch
 from torch import Tensor, nn
 from torch import distributed as dist
 
-from interpose.errors import FileError
+from interpose.errors import FileError, RequestError
 from interpose.methods.weights import Card
 from interpose.training.budget import Budget
 from interpose.training.device import processes, rank
@@ -42,6 +42,13 @@ class Settings:
     average: float = 0.999
     seed: int = 1
     every_seconds: float = 300.0
+
+    def __post_init__(self) -> None:
+        """Raises RequestError for what no run can do."""
+        if not 0 < self.warm_up <= 1:
+            raise RequestError(
+                f"cannot warm up over {self.warm_up:g} of the budget", "it is a share", "Choose 0.001 to 1."
+            )
 
 
 def commit() -> str:
@@ -277,11 +284,26 @@ class Trainer:
             }
             kept["commit"] = commit()
             (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
+        # What is drawn on the device differs between processes, and is not drawn again by a run that goes on.
+        own = np.random.SeedSequence([self.settings.seed, rank(), self.budget.spent_steps])
+        torch.manual_seed(int(own.generate_state(1)[0]))
         self.budget.start(gpu=self.device.type == "cuda")
+        stop = Stop()
+        try:
+            self._steps(stop)
+        finally:
+            stop.over()
+        if stop.asked:
+            raise KeyboardInterrupt
+        if dist.is_initialized():
+            dist.barrier()
+        return self.averaged
+
+    def _steps(self, stop: Stop) -> None:
+        """Step by step, until the budget is spent or somebody asks to stop."""
         told = time.monotonic() - self.settings.every_seconds * 0.8
         losses: list[Tensor] = []
         against: list[Tensor] = []
-        stop = Stop()
         while self.budget.fraction < 1 and not stop.asked:
             opponents = [self.opponent] if self.opponent else []
             paces = [(self.optimizer, 1.0), *((one.optimizer, one.pace) for one in opponents)]
@@ -318,12 +340,6 @@ class Trainer:
                 said = {"loss": losses, **({"opponent": against} if against else {})}
                 self._tell({name: round(float(torch.stack(some).mean()), 5) for name, some in said.items()})
                 told, losses, against = time.monotonic(), [], []
-        stop.over()
-        if stop.asked:
-            raise KeyboardInterrupt
-        if dist.is_initialized():
-            dist.barrier()
-        return self.averaged
 
     def _draw(self, entry: dict[str, float]) -> None:
         """Curves over steps, for those who look at them in TensorBoard."""
@@ -345,8 +361,9 @@ class Trainer:
             **losses,
         }
         entry |= {name: round(value, 4) for name, value in self.validate(self.averaged).items()}
+        # First: a run that is killed in between would say the same steps twice.
+        self.save()
         with (self.folder / "log.jsonl").open("a") as log:
             log.write(json.dumps(entry) + "\n")
         self._draw(entry)
-        self.save()
         self.say("  ".join(f"{name} {value}" for name, value in entry.items()))

@@ -144,6 +144,12 @@ class Poses:
     def spread(self, count: int, length: int) -> Batch:
         """A fixed set of windows spread evenly over all clips, for validation."""
         whole = [(c, f) for c, n in enumerate(self.counts) for f in range(0, n - length + 1, length)]
+        if not whole:
+            raise RequestError(
+                f"no clip that is held out has the {length} frames that are judged",
+                f"the longest one has {self.counts.max()} at 30 fps",
+                "Hold out longer clips.",
+            )
         chosen = np.array(whole)[np.linspace(0, len(whole) - 1, min(count, len(whole))).astype(int)]
         return self.at(chosen[:, 0], chosen[:, 1], length)
 

@@ -77,6 +77,7 @@ class StmiGanSettings(Settings):
     tallest: float = 1.3  # bodies are made smaller or larger by up to this factor
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.config not in CONFIGS:
             raise unknown("config", self.config, CONFIGS)
         if bad := [name for name in self.looks if name not in BRANCHES]:

@@ -80,5 +80,11 @@ class Windows:
             for clip, frames in enumerate(self.counts)
             for first in range(0, frames - self.length + 1, self.length // 2)
         ]
+        if not whole:
+            raise RequestError(
+                f"no clip that is held out has the {self.length} frames that are judged",
+                f"the longest one has {self.counts.max()} at 30 fps",
+                "Hold out longer clips.",
+            )
         chosen = np.array(whole)[np.linspace(0, len(whole) - 1, min(count, len(whole))).astype(int)]
         return self.at(chosen[:, 0], chosen[:, 1])
