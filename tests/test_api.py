@@ -108,3 +108,7 @@ def test_clips_and_paths_are_stitched(cmu_walk, data):
     done = interpose.stitch([cmu_walk, data / "cmu_run.bvh"], 12, method="linear")
     assert len(done.clip) == 209 + 12 + 42
     assert [laid.start for laid in done.clips] == [0, 221]
+
+
+def test_scan_takes_paths_and_clips(data, cmu_walk):
+    assert interpose.scan(data / "cmu_walk.bvh") == interpose.scan(cmu_walk)

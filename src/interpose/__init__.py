@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from interpose.methods.registry import names as method_names
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
-    from interpose.observation.scan import scan
+    from interpose.observation.scan import Finding
     from interpose.tasks import Forecast, Stitched
 
 __version__ = "0.1.0"
@@ -72,7 +72,6 @@ _HOMES = {
     "load": "interpose.formats",
     "method_names": "interpose.methods.registry:names",
     "save": "interpose.formats",
-    "scan": "interpose.observation.scan",
 }
 
 AnyGap: TypeAlias = "Gap | str | tuple[int, int] | tuple[int, int, Sequence[str]]"
@@ -89,6 +88,22 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+def scan(clip: Clip | str | Path, observation: Observation | None = None) -> list[Finding]:
+    """What looks missing in a clip, in order of time: frozen, broken and rest poses, and what `observation`
+    says is unknown.
+
+    Args:
+        clip: a clip, or the path of one.
+        observation: what is known of it; all of it without.
+
+    Raises:
+        FileError: the file cannot be read.
+    """
+    from interpose.observation.scan import scan as look
+
+    return look(_clip(clip), observation)
 
 
 def fill(
@@ -132,7 +147,7 @@ def fill(
     from interpose import tasks
     from interpose.errors import RequestError
     from interpose.observation import Observation, Part, Pin
-    from interpose.observation.scan import scan, to_gaps
+    from interpose.observation.scan import to_gaps
 
     clip = _clip(clip)
     if gaps is None:

@@ -405,6 +405,12 @@ def forecast(
     gap = Gap(len(clip), len(longer))
     job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
     chosen = job.method.name if method == "auto" and job.method else method
+    if samples > 1 and job.method and (why := job.method.refuses(longer, gap)):
+        raise RequestError(
+            f"cannot draw {samples} samples",
+            f"{chosen} refuses: {why}",
+            "Ask for one, or give it more to see.",
+        )
     if samples > 1 and not isinstance(registry.get(chosen), Sampler):
         raise registry.one_answer(f"cannot draw {samples} samples with {chosen}")
     seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]

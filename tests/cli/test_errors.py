@@ -170,13 +170,15 @@ def test_faults_of_the_program_show_no_traceback(run, take, monkeypatch):
 
 
 def test_debug_shows_where_an_error_comes_from(run, take, monkeypatch):
+    """And the error itself, with the exit code that it has without."""
     break_loading(monkeypatch, FileError("what", "why", "fix"))
-    assert run("scan", "take.bvh").code == 3
-    with pytest.raises(FileError):
-        run("scan", "take.bvh", "--debug")
+    plain = run("scan", "take.bvh")
+    told = run("scan", "take.bvh", "--debug")
     monkeypatch.setenv("INTERPOSE_DEBUG", "1")
-    with pytest.raises(FileError):
-        run("scan", "take.bvh")
+    for done in (told, run("scan", "take.bvh")):
+        assert done.code == plain.code == 3
+        assert done.err.startswith("Traceback")
+        assert done.err.endswith(plain.err)
 
 
 def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch):

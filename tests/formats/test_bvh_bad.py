@@ -94,7 +94,7 @@ def test_paths(tmp_path, good):
         ("Frames: 4", "", "no number of frames"),
         ("Frames: 4", "Frames: 0", "no frames"),
         ("Frames: 4", "Frames: 3", "36 numbers follow"),
-        ("Frames: 4", "Frames: 5", "room for 4"),
+        ("Frames: 4", "Frames: 5", "holds 4"),
         ("Frames: 4", "Frames: 999999999999", "truncated"),
         ("Time: 0.0333333", "Time: 0", "frame time is 0"),
         ("Time: 0.0333333", "Time: -0.1", "frame time is -0.1"),
@@ -132,10 +132,10 @@ def test_wrong_counts_name_the_line(tmp_path, good):
 
 def test_truncated(tmp_path, good):
     lines = good.splitlines(keepends=True)
-    assert "room for 3:" in error(tmp_path, "".join(lines[:-1]))
+    assert "holds 3:" in error(tmp_path, "".join(lines[:-1]))
     why = error(tmp_path, "".join(lines[:-2]) + " ".join(lines[-2].split()[:5]))
-    assert "room for 2 and 5 of the 9 numbers of one more" in why
-    assert "room for 0" in error(tmp_path, "".join(lines[:-4]))
+    assert "holds 2 and 5 of the 9 numbers of one more" in why
+    assert "holds 0" in error(tmp_path, "".join(lines[:-4]))
 
 
 def test_nesting_and_joints_are_limited(tmp_path):

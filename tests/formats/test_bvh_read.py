@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -132,6 +133,7 @@ def test_z_up(tmp_path, make_bvh, body):
     """A file with Z up is turned as a whole: the same joints stand at the same places, turned."""
     lying = [(n, d, (o[0], -o[2], o[1]), c) for n, d, o, c in body]
     values = numbers(np.random.default_rng(4), 5, 30, 25)
+    values[:, :3] *= 0.1  # bodies do not fly about
     path = tmp_path / "z.bvh"
     path.write_text(make_bvh(lying, values))
     clip = formats.load(path)
@@ -145,6 +147,28 @@ def test_z_up(tmp_path, make_bvh, body):
     assert clip.skeleton.rest_translation[head, 1] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize("axis", ["y", "z"])
+def test_who_crawls_is_on_the_floor(tmp_path, cmu_walk, axis):
+    """The head is ahead of the feet, not above them, all the time: the floor tells what is up."""
+    down = rotations.about("X", np.array(np.radians(85.0)))
+    facing = rotations.twist_about(cmu_walk.rotation[:, 0], np.array([0.0, 1.0, 0.0]))
+    upright = rotations.multiply(rotations.conjugate(facing), cmu_walk.rotation[:, 0])
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[:, 0] = rotations.multiply(facing, rotations.multiply(down, upright))
+    lying = replace(cmu_walk, rotation=rotation, source=None)
+    translation[:, 0, 1] -= lying.positions()[..., 1].min(axis=1)
+    lying = replace(lying, rotation=rotation.copy(), translation=translation)
+    path, written = tmp_path / "crawl.bvh", lying
+    if axis == "z":
+        turn = rotations.about("X", np.array(np.pi / 2))
+        rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+        written = replace(lying, rotation=rotation, translation=rotations.rotate(turn, translation))
+    formats.save(written, path)
+    clip = formats.load(path)
+    assert clip.source.up == axis
+    np.testing.assert_allclose(clip.positions(), lying.positions(), atol=1e-4)
+
+
 @pytest.mark.parametrize(
     ("up", "file"),
     [("x", [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]), ("-y", [[1, 0, 0], [0, -1, 0], [0, 0, -1]])],
@@ -153,8 +177,9 @@ def test_other_axes_up(tmp_path, make_bvh, body, up, file):
     """A body that stands along X, or on its head: read upright, whole and unharmed."""
     turn = np.array(file, float)  # from the clip's axes to the file's
     lying = [(n, d, tuple(turn @ np.array(o)), c) for n, d, o, c in body]
-    path = tmp_path / "body.bvh"
-    path.write_text(make_bvh(lying, numbers(np.random.default_rng(4), 5, 30, 25)))
+    path, values = tmp_path / "body.bvh", numbers(np.random.default_rng(4), 5, 30, 25)
+    values[:, :3] *= 0.1
+    path.write_text(make_bvh(lying, values))
     clip = formats.load(path)
     assert clip.source.up == up
     head, foot = clip.skeleton.index("Head"), clip.skeleton.index("LeftFoot")

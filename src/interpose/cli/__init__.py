@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
+import traceback
 import warnings
 from collections.abc import Sequence
 
@@ -77,7 +78,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return code
     except InterposeError as error:
         if debug:
-            raise
+            traceback.print_exc()
         _complain(error)
         return error.exit_code
     except KeyboardInterrupt:
@@ -88,7 +89,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return 0
     except Exception as error:
         if debug:
-            raise
+            traceback.print_exc()
         kind = type(error).__name__
         why = f"a {kind} that it should have foreseen"
         fix = "Run it again with --debug and report what that prints."

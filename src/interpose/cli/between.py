@@ -105,6 +105,9 @@ def _blocked(
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
     said = ""
+    tasks.block(
+        {0: _frame_of(before, last), 1: _frame_of(after, first)}
+    )  # of one character, or it is refused
     if frames == "auto":
         count, why = plausible_length(before, last, after, first)
         said = f"{count} frames: {why}"

@@ -12,6 +12,8 @@ from interpose.cli.console import say
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
 
+FASTEST = 1000.0  # frames a second
+
 
 def convert(
     file: Annotated[Path, Parameter(name="IN")],
@@ -48,6 +50,12 @@ def convert(
             f"cannot write {output}", "it is the input, which stays as it is", "Choose another name."
         )
     # The layout of the file does not depend on the rate: units, axes and End Sites stay as they were.
+    if fps is not None and not 0 < fps <= FASTEST:
+        raise RequestError(
+            f"cannot write {fps:g} frames a second",
+            "nobody records or plays that",
+            f"Choose up to {FASTEST:g}.",
+        )
     made = replace(resample(clip, fps), source=clip.source) if fps is not None else clip
     notes = save(replace(made, name=output.stem), output, force=force)
     say("\n".join(describe(file, clip)))

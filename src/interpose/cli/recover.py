@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from interpose.cli.console import progress
+from interpose.cli.console import progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
@@ -78,4 +78,9 @@ def recover(
             "no joint snaps to its rest pose for up to a second, and none spikes",
             "Longer losses: interpose scan finds them, and --joints LeftArm names them.",
         )
-    return finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
+    code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
+    if chosen is None and not json:
+        say(
+            "Losses of more than a second are not looked for: interpose scan finds them, --joints names them."
+        )
+    return code

@@ -689,7 +689,11 @@ def _report(
             *span.notes,
             *((inside[1],) if inside and inside[1] else ()),
             *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
-            *((_doubtful(risk, gap, first),) if risk is not None and risk.mean() > DOUBT else ()),
+            *(
+                (_doubtful(risk, gap, first, gap.stop == len(finished)),)
+                if risk is not None and risk.mean() > DOUBT
+                else ()
+            ),
             *((scant,) if scant else ()),
             *((_rests(never, span.method),) if never else ()),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
@@ -712,11 +716,11 @@ def _dull(alive: float, gap: Gap, first: int) -> str:
     )
 
 
-def _doubtful(risk: np.ndarray, gap: Gap, first: int) -> str:
-    return (
-        f"flagged: joints are expected to be off by {100 * risk.mean():.0f} cm: nothing tells what happens "
-        f"here. A key near frame {first + gap.start + int(risk.argmax())} helps most"
-    )
+def _doubtful(risk: np.ndarray, gap: Gap, first: int, ahead: bool) -> str:
+    off = f"{100 * risk.mean():.0f} cm"
+    said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
+    # Whoever asks for what comes next has no key to give.
+    return said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps most"
 
 
 def _never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:

@@ -222,6 +222,7 @@ def run_long(
     local, root, known = local.copy(), root.copy(), known.copy()
     stands, expected = np.full((len(root), len(FEET)), np.nan), np.full(len(root), np.nan)
     for begin, end in runs(np.logical_not(known.all(axis=1))):
+        carried = 0.0  # what the frames that a window starts from are expected to be off by themselves
         while begin < end:
             short = end - begin <= card.max_gap
             last = min(end + CONTEXT, len(root)) if short else begin + card.max_gap
@@ -236,7 +237,12 @@ def run_long(
             held = known[inside]
             local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
             root[inside] = np.where(held[:, -1:], root[inside], said.root[own])
-            for held_back, new in ((stands, said.stands), (expected, said.expected)):
+            # It wears off towards what is known again.
+            left = np.linspace(1, 0, stop - begin) if stop == end < len(root) else 1.0
+            risk = said.expected.copy()
+            risk[own] += carried * left
+            carried = float(risk[own][-1])
+            for held_back, new in ((stands, said.stands), (expected, risk)):
                 held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
                 held_back[inside] = new[own]
             known[inside] = True

@@ -22,6 +22,7 @@ _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION[ \t]*(?=[\r\n]|\Z)", re.IGNORE
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 
+LONGEST = 10.0  # seconds that a frame may take: what takes longer is no motion
 # Rates that people record and deliver at: a rounded frame time such as 0.033333 means one of these.
 RATES = (
     *(10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 75, 90),
@@ -108,6 +109,13 @@ def parse_header(start: bytes, name: str) -> Header:
         shown = f"the frame time is {time[1][:40].decode('latin-1')}" if time else "no frame time"
         raise FileError(
             what, f"line {line}: {shown}", 'Write "Frame Time:" and the seconds, for example 0.0333333.'
+        )
+    if seconds > LONGEST:
+        line = line_of(start, frames.end()) + 1
+        raise FileError(
+            what,
+            f"line {line}: a frame takes {seconds:g} seconds",
+            f'Was it meant in milliseconds? Then write "Frame Time: {seconds / 1000:g}".',
         )
     if int(frames[1]) == 0:
         raise FileError(what, "its motion has no frames (Frames: 0)", "Export the clip with its motion.")

@@ -73,7 +73,8 @@ def read_text(path: Path) -> tuple[Header, MotionText]:
             fix = "Split it into shorter clips."
             raise FileError(what, f"it is larger than {FILE_LIMIT >> 30} GiB", fix)
         if left < 2 * count:
-            raise _truncated(what, header, left // 2)
+            text = np.frombuffer(header.text + first[len(header.text) :] + file.read(), np.uint8)
+            raise _truncated(what, header, nth_words(text, len(header.text), header.channels)[1])
         if left > NUMBER_LIMIT * count + BLOCK:
             raise FileError(
                 what,
@@ -105,7 +106,7 @@ def _truncated(what: str, header: Header, numbers: int) -> FileError:
     piece = f" and {rest} of the {header.channels} numbers of one more" if rest else ""
     return FileError(
         what,
-        f"it says {header.frames} frames but has room for {whole}{piece}: it is truncated",
+        f"it says {header.frames} frames but holds {whole}{piece}: it is truncated",
         f'Export it again, or write "Frames: {whole}" and delete what is left of the last frame.',
     )
 
