@@ -76,3 +76,10 @@ def test_from_python(walk):
     assert one.samples == [one]
     assert np.array_equal(one.spread(), np.zeros(20))
     assert len(interpose.forecast(walk, method="zero-velocity").clip) == len(clip) + round(2 * clip.fps)
+
+
+def test_its_report_is_none_that_fill_repeats(run, take):
+    assert run("forecast", "take.bvh", "--frames", "10", "--method", "spline").code == 0
+    done = run("fill", "take.bvh", "--gaps", "take.forecast.json", "-o", "again.bvh")
+    assert done.code == 2
+    assert "Run interpose forecast again." in done.err

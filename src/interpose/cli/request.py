@@ -18,6 +18,8 @@ from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import scan, to_gaps
 
+OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
+
 
 @dataclass(frozen=True)
 class Request:
@@ -69,8 +71,11 @@ def from_options(
             why = "the file says which joints are missing"
             fix = 'Write "joints": ["LeftArm"] into its entries.'
             raise RequestError("--joints does not apply to --gaps", why, fix)
-        filled = read_gaps(gaps)
         content = read_json(gaps)
+        if is_report(content) and (verb := content.get("verb")) in OTHERS:
+            why = f"{gaps} is of {verb}, which makes what is no gap of the clip that it was given"
+            raise RequestError("this report cannot be repeated", why, f"Run interpose {verb} again.")
+        filled = read_gaps(gaps)
         if is_report(content) and listed:
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
             fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."
