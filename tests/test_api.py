@@ -112,3 +112,10 @@ def test_clips_and_paths_are_stitched(cmu_walk, data):
 
 def test_scan_takes_paths_and_clips(data, cmu_walk):
     assert interpose.scan(data / "cmu_walk.bvh") == interpose.scan(cmu_walk)
+
+
+@pytest.mark.parametrize("gap", [slice(10, 20), 7, [slice(10, 20)]])
+def test_gaps_that_are_none_say_how_to_write_one(cmu_walk, gap):
+    with pytest.raises(interpose.RequestError, match="cannot read the gap") as failed:
+        interpose.fill(cmu_walk, gap)
+    assert len(str(failed.value)) < 300

@@ -12,7 +12,7 @@ half-open. Nothing heavy is imported before it is used.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -364,7 +364,7 @@ def _several(gaps: Any) -> list[Any]:
     """The gaps of a list, or a list of the one that was given: a pair of numbers is one."""
     from interpose.observation import Gap
 
-    if isinstance(gaps, Gap | str):
+    if isinstance(gaps, Gap | str) or not isinstance(gaps, Iterable):
         return [gaps]
     gaps = list(gaps)
     return [tuple(gaps)] if gaps and isinstance(gaps[0], int) else gaps
@@ -384,7 +384,7 @@ def _gap(gap: Any) -> Gap:
         return Gap(int(start), int(stop), tuple(names) if names is not None else None)
     except (TypeError, ValueError):
         raise RequestError(
-            f"cannot read the gap {gap!r}",
+            f"cannot read the gap {str(gap)[:60]}",
             "a gap is a Gap, a text or a tuple",
             'Write "120:160", (120, 160) or (120, 160, ["LeftArm"]).',
         ) from None
