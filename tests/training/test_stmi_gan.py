@@ -122,7 +122,9 @@ def test_each_side_gains_by_what_is_worse_for_the_other(windows, monkeypatch):
     for right in (5.0, -5.0):
         play.discriminator = Judge(right)
         rng = np.random.default_rng(0)
-        found.append((float(play.opponent_loss(rng, 0.0)), float(play.loss(rng, 0.0))))
+        with torch.no_grad():
+            maker = float(play.loss(rng, 0.0))
+        found.append((float(play.opponent_loss(rng, 0.0).detach()), maker))
     (judge_right, maker_right), (judge_wrong, maker_wrong) = found
     assert judge_right < 0.1 < judge_wrong
     assert maker_wrong < 1.0 < maker_right
