@@ -105,9 +105,8 @@ def _blocked(
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
     said = ""
-    tasks.block(
-        {0: _frame_of(before, last), 1: _frame_of(after, first)}
-    )  # of one character, or it is refused
+    # Of one character, or it is refused.
+    tasks.block({0: _frame_of(before, last), 1: _frame_of(after, first)})
     if frames == "auto":
         count, why = plausible_length(before, last, after, first)
         said = f"{count} frames: {why}"

@@ -171,7 +171,9 @@ def complete(
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
             _fade(current, source, hidden, known, span)
-            mended[span.start] = _mend(current, known, span, bounds)
+            places = _mend(current, known, span, bounds)
+            if source is opinion:
+                mended[span.start] = places
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
             if source is not opinion or not (isinstance(method, Layer) and method.stands):
@@ -213,6 +215,7 @@ def complete(
         span.notes += [
             f"a spline leads over frames {first + start} to {first + stop - 1}, where velocities jumped"
             for start, stop in mended.get(span.start, ())
+            if span.method == method.name
         ]
         if above := _pop(current, known, span, bounds):
             span.notes.append(f"flagged: {above}")

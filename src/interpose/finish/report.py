@@ -41,7 +41,7 @@ class GapReport:
         seam_limit: cm a frame squared, the 95th percentile of the clip's own velocity jumps.
         peak: cm a frame squared, the largest velocity jump of any joint inside the gap.
         peak_limit: cm a frame squared, what it may be: twice the largest one of the observed motion around
-            the gap, or eight seam limits.
+            the gap, or eight seam limits, or what a person does who sets off.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.

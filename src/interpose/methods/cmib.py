@@ -133,12 +133,8 @@ class Cmib:
             known = np.zeros(count, bool)
             positions = np.zeros((count, *placed.shape[1:]))
             rotation = np.tile([1.0, 0.0, 0.0, 0.0], (count, turned.shape[1], 1))
-            poses = np.array(keys)[kept]
-            known[slots[kept]], positions[slots[kept]], rotation[slots[kept]] = (
-                True,
-                placed[poses],
-                turned[poses],
-            )
+            at, poses = slots[kept], np.array(keys)[kept]
+            known[at], positions[at], rotation[at] = True, placed[poses], turned[poses]
             hips, said, off = run(card.onnx, positions, rotation, known, label, lengths)
             missed |= {key: float(off[slot] / body.scale) for key, slot in zip(keys, slots)}
             for a, b in zip(keys, keys[1:]):

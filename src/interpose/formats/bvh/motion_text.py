@@ -18,6 +18,7 @@ from interpose.formats.text import NUMBER, VALUE_LIMIT, FrameText, line_of, nth_
 BLOCK = 4 << 20  # bytes read and scanned at once
 LINE_LIMIT = 8 << 20  # bytes: no line of a real clip comes near
 NUMBER_LIMIT = 64  # bytes of a number with the blanks behind it, on average
+COUNTED = 256 << 20  # bytes of a file whose numbers are counted to say how many frames it holds
 FILE_LIMIT = 2 << 30  # bytes: five hours at 120 frames a second
 
 
@@ -73,7 +74,10 @@ def read_text(path: Path) -> tuple[Header, MotionText]:
             fix = "Split it into shorter clips."
             raise FileError(what, f"it is larger than {FILE_LIMIT >> 30} GiB", fix)
         if left < 2 * count:
-            text = np.frombuffer(header.text + first[len(header.text) :] + file.read(), np.uint8)
+            if size > COUNTED:
+                fix = 'Check the number behind "Frames:", or export the clip again.'
+                raise FileError(what, f"{left >> 20} MiB cannot hold {header.frames} frames", fix)
+            text = np.frombuffer(first + file.read(), np.uint8)
             raise _truncated(what, header, nth_words(text, len(header.text), header.channels)[1])
         if left > NUMBER_LIMIT * count + BLOCK:
             raise FileError(
