@@ -37,6 +37,7 @@ SECONDS = 4
 FPS = 30  # of windows
 RATES = (5, 30)  # frames a second at which they may be measured
 HIDDEN = 0.8
+BOTH = ", mirrored too"
 
 # From positions (T, 22, 3) in metres, 0 where hidden, and which are known (T, 22, 3), to all positions.
 Row = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -65,11 +66,12 @@ def autoencoder(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
     return completed[0]
 
 
-def inpainting(card: Card) -> Row:
-    """STMI-GAN without noise, settled into joints that are known."""
+def inpainting(card: Card, both: bool) -> Row:
+    """STMI-GAN without noise, settled into joints that are known; `both` in the mean with the mirror image."""
+    complete = stmi_gan.run_both if both else stmi_gan.run
 
     def fill(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
-        return stmi_gan.run(card, positions[None], known[None])[1][0]
+        return complete(card, positions[None], known[None])[1][0]
 
     return fill
 
@@ -80,8 +82,9 @@ def sees(card: Card, rate: int) -> bool:
 
 
 def networks(cards: Sequence[Card], rate: int) -> dict[str, Row]:
-    """A row for each of some weights of STMI-GAN, named as in table 1. RequestError for weights that do not
-    see a window frame by frame at that rate."""
+    """Rows for each of some weights of STMI-GAN, named as in table 1: as in the paper, and as users get it, in
+    the mean with the mirror image. RequestError for weights that do not see a window frame by frame at that
+    rate."""
     for card in cards:
         if not sees(card, rate):
             raise RequestError(
@@ -89,7 +92,12 @@ def networks(cards: Sequence[Card], rate: int) -> dict[str, Row]:
                 f"it sees {card.training['network']['frames']} frames, and windows have {SECONDS * rate}",
                 f"Add --fps {FPS if sees(card, FPS) else RATES[0]}.",
             )
-    return {name: inpainting(row.card) for name, row in named(cards).items() if row.card}
+    return {
+        name + BOTH * both: inpainting(row.card, both)
+        for name, row in named(cards).items()
+        for both in (False, True)
+        if row.card
+    }
 
 
 ROWS: dict[str, Row] = {"linear": linear, "kalman": kalman}

@@ -38,6 +38,7 @@ JUDGED = 10 + 45 + 1  # frames of a window that is validated: known ones, the lo
 # A foot stands that moves by less than this in a frame, in metres (.15 m a second).
 STANDS = 0.005
 STANDING = Constant(FEET)
+TYPICAL = 0.05  # metres that the starting point is off, in gaps of a second
 # How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
 TASKS: dict[str, dict[str, float]] = {
     "all": {
@@ -93,6 +94,8 @@ class BaseSettings(Settings):
     contact: float = 0.2
     slide: float = 5.0  # of metres a frame that a standing foot moves
     risk: float = 0.02
+    # How far a batch counts by what it leaves of the starting point's error: 0 by metres alone, 1 by that.
+    relative: float = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -261,6 +264,17 @@ class Losses:
         return torch.stack([getattr(self.settings, name) * part for name, part in parts.items()]).sum()
 
 
+def relief(begun: Tensor, placed: Tensor, known: Tensor) -> Tensor:
+    """How far off the starting point of a batch is, as a multiple of TYPICAL.
+
+    In metres long gaps are most of the loss: a gap of 5 frames has a sixth of the gradient of one of 30. Each
+    batch is of one length, so that it can be counted by how hard it is.
+    """
+    missing = (known < 1).any(dim=2)
+    off = (begun - placed).norm(dim=-1).mean(dim=2)
+    return (off * missing).sum() / missing.sum().clamp(min=1) / TYPICAL + 1e-2
+
+
 def title(config: str, datasets: str) -> str:
     """What weights are called: the configuration, and what they were trained on, if not on all; "open" if on
     what may be used for anything."""
@@ -323,7 +337,8 @@ def train_base(
         with torch.autocast(device.type, torch.bfloat16):
             said = model.encoder(seen, drawn.label, drawn.bones)
         answer = model.answer(start, said, given.local, known)
-        return losses(answer, drawn.rotation, placed, known, drawn.bones)
+        weight = relief(start.placed, placed, known) ** -settings.relative
+        return weight * losses(answer, drawn.rotation, placed, known, drawn.bones)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
         if settings.muon:

@@ -41,6 +41,7 @@ class CmibSettings(Settings):
     placed: float = 0.05
     dropout: float = 0.0  # the paper: .05; drawing it takes a third of the time, and the run is short
     representation: str = "quaternion"  # table 1; also "axis-angle" and "euler"
+    residual: int = 1  # 0 for the paper's own network
     decay: float = 0.01
     betas: tuple[float, float] = (0.9, 0.99)
     muon: int = 0  # whether Muon moves the matrices of the layers; else AdamW moves all, as in the paper
@@ -134,7 +135,13 @@ def train_cmib(
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6
-    config = CmibConfig(labels, heads, dropout=settings.dropout, representation=settings.representation)
+    config = CmibConfig(
+        labels,
+        heads,
+        dropout=settings.dropout,
+        residual=bool(settings.residual),
+        representation=settings.representation,
+    )
     model = Cmib(config).to(device)
     if start:
         restore(model, start.onnx)
