@@ -9,7 +9,7 @@ from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.skeletons import mirror as module
-from interpose.skeletons.mirror import mirror, sides
+from interpose.skeletons.mirror import mirror, mirrored, sides
 
 NAMES = ("Hips", "LeftUpLeg", "LeftLeg", "RightUpLeg", "RightLeg", "Spine", "thumb.l", "thumb.r")
 PARENTS = (-1, 0, 1, 0, 3, 0, 5, 5)
@@ -34,10 +34,10 @@ def motion(skeleton: Skeleton, frames: int = 5, translated: tuple[int, ...] = ()
 @pytest.mark.parametrize("translated", [(), (0, 6, 7)])
 def test_positions_are_mirrored_and_sides_swapped(axis, translated):
     clip = motion(skeleton(axis), translated=translated)
-    mirrored = mirror(clip)
+    image = mirror(clip)
     swapped = [0, 3, 4, 1, 2, 5, 7, 6]
     expected = clip.positions()[:, swapped] * [-1, 1, 1]
-    np.testing.assert_allclose(mirrored.positions(), expected, atol=1e-12)
+    np.testing.assert_allclose(image.positions(), expected, atol=1e-12)
     np.testing.assert_allclose(np.linalg.norm(mirrored.rotation, axis=-1), 1)
 
 
@@ -100,3 +100,8 @@ def test_a_real_walk(cmu_walk):
     away = np.linalg.norm(mirrored.positions() - expected, axis=-1)
     assert away.max() < 0.05, "the actor's own asymmetry is a few centimetres"
     assert (mirror(mirrored).rotation == cmu_walk.rotation).all()
+
+
+def test_mirrored_motions_have_mirrored_labels():
+    labels = ("", "raise-left-hand", "raise-right-hand", "turn-left", "walk")
+    assert mirrored(labels) == [0, 2, 1, 0, 4]

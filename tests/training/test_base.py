@@ -237,7 +237,8 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
                 value.copy_(value.half())
         expected = model(*(v.float() if v.is_floating_point() else v for v in given))
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-    said = method.run(card.onnx, local, root, known == 1, int(given[5][0]), bones, (pinned, pins))
+    label = int(given[5][0])
+    (said,) = method.run(card.onnx, method.Seen(local, root, known == 1, (label, 0), bones, pinned, pins))
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
@@ -259,7 +260,7 @@ def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
         sizes.append(path.stat().st_size)
         local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-        said.append(method.run(path, local, root, known == 1, 0, bones, (pinned, pins)))
+        said += method.run(path, method.Seen(local, root, known == 1, (0, 0), bones, pinned, pins))
         for exact in (False, True) if files == 1 else (False,):
             again = Base(TINY)
             restore(again, path)
@@ -289,6 +290,32 @@ def test_it_completes_clips(trained, cmu_walk, monkeypatch):
     assert small.for_action("walk").action == "walk"
     with pytest.raises(RequestError, match="unknown action"):
         small.for_action("fly")
+
+
+def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_path):
+    """Also where the two disagree; what is known of half a pose stays exactly."""
+    path = tmp_path / "small.onnx"
+    export.export_base_onnx(copy.deepcopy(model).float(), path)
+    local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
+    known = known == 1
+    known[12:20, 5:9] = True
+    pins = pins.copy()
+    pins[15, 17] = True
+    seen = method.Seen(local, root, known, (1, 0), bones, pinned, pins)
+    once, image = method.run(path, seen)[0], method.run(path, seen.mirrored())[0]
+    assert np.abs(once.root - image.root * [-1, 1, 1]).max() > 1e-3  # by itself it is not
+    for limit in (np.pi, 0.0):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(method, "AGREE", limit)
+            said, other = method.run_both(path, seen), method.run_both(path, seen.mirrored())
+        back = seen.mirrored()
+        back.local, back.root = other.local, other.root
+        back = back.mirrored()
+        assert np.abs(said.root - back.root).max() < 1e-5
+        assert rotations.angle(said.local, back.local).max() < 1e-3
+        assert np.allclose(said.stands, other.stands[:, [2, 3, 0, 1]], atol=1e-5)
+        kept = rotations.angle(said.local, seen.local)[known[:, :-1]]
+        assert kept.max() < 1e-3
 
 
 def test_knowledge_of_canonical_rotations(cmu_walk):

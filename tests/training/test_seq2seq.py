@@ -14,7 +14,7 @@ from interpose.geometry import rotations  # noqa: E402
 from interpose.methods import weights  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.export import export_seq2seq  # noqa: E402
-from interpose.training.poses import Poses, mirrored  # noqa: E402
+from interpose.training.poses import Poses  # noqa: E402
 from interpose.training.seq2seq import Seq2SeqSettings, train_seq2seq  # noqa: E402
 
 SETTINGS = Seq2SeqSettings(batch=8, seen=12, foretold=6, units=64, average=0.5, learning_rate=5e-3)
@@ -65,8 +65,3 @@ def test_the_graph_goes_on_as_the_network_does(pack, trained, tmp_path):
     there, after = weights.session(card.onnx).run(None, feed)
     assert rotations.angle(torch.from_numpy(there), expected[0]).max() < 2e-3
     assert np.abs(after - expected[1].numpy()).max() < 2e-3
-
-
-def test_mirrored_motions_have_mirrored_labels():
-    labels = ("", "raise-left-hand", "raise-right-hand", "turn-left", "walk")
-    assert mirrored(labels) == [0, 2, 1, 0, 4]

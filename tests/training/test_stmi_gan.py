@@ -12,8 +12,9 @@ pytest.importorskip("onnx")
 
 from interpose.errors import RequestError  # noqa: E402
 from interpose.methods import weights  # noqa: E402
-from interpose.methods.stmi_gan import StmiGan, run, run_long  # noqa: E402
+from interpose.methods.stmi_gan import StmiGan, run, run_both, run_long  # noqa: E402
 from interpose.models.stmi_gan import PAPER, Discriminator, Generator  # noqa: E402
+from interpose.skeletons import SIDES  # noqa: E402
 from interpose.training import stmi_gan  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.export import export_stmi_gan  # noqa: E402
@@ -178,6 +179,17 @@ def test_a_run_learns_stops_and_goes_on(pack, tmp_path, monkeypatch):
         expected = model(torch.from_numpy(positions), torch.from_numpy(observed), still)
     assert np.allclose(raw, expected[0], atol=1e-4)
     assert np.allclose(completed, expected[1], atol=1e-4)
+
+    # Lost joints are restored alike on either side.
+    def across(values: np.ndarray) -> np.ndarray:
+        return values[:, :, list(SIDES)] * [-1, 1, 1]
+
+    for one, image in zip(
+        run_both(card, positions, observed), run_both(card, across(positions), observed[:, :, list(SIDES)])
+    ):
+        assert np.allclose(one, across(image), atol=1e-5)
+    whole = observed.all(axis=-1)
+    assert np.allclose(run_both(card, positions, observed)[1][whole], positions[whole], atol=1e-5)
 
     # Forecasts go on past the window; what is known stays.
     motion, seen = positions[0].repeat(3, axis=0).astype(float), np.ones((60, 22), bool)

@@ -67,7 +67,7 @@ def autoencoder(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
 
 
 def inpainting(card: Card, both: bool) -> Row:
-    """STMI-GAN without noise, settled into joints that are known; `both` in the mean with the mirror image."""
+    """STMI-GAN without noise, settled into joints that are known; `both`: in the mean with its mirror."""
     complete = stmi_gan.run_both if both else stmi_gan.run
 
     def fill(positions: np.ndarray, known: np.ndarray) -> np.ndarray:
@@ -82,9 +82,8 @@ def sees(card: Card, rate: int) -> bool:
 
 
 def networks(cards: Sequence[Card], rate: int) -> dict[str, Row]:
-    """Rows for each of some weights of STMI-GAN, named as in table 1: as in the paper, and as users get it, in
-    the mean with the mirror image. RequestError for weights that do not see a window frame by frame at that
-    rate."""
+    """Rows for each of some weights of STMI-GAN, named as in table 1: as in the paper, and the mean with the
+    mirror image, as users get it. RequestError for weights that do not see windows frame by frame."""
     for card in cards:
         if not sees(card, rate):
             raise RequestError(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +22,12 @@ from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import JOINTS, PARENTS, Mapping, find_mapping
+from interpose.skeletons import ACROSS, ACROSS_TURN, JOINTS, PARENTS, SIDES, Mapping, find_mapping
+from interpose.skeletons.mirror import mirrored
 
 FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
+FEET_ACROSS = [FEET.index(SIDES[foot]) for foot in FEET]
+AGREE = np.pi / 2  # how far a motion and its mirror image may be apart, in any joint
 CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
 COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
 
@@ -78,15 +81,15 @@ class Base:
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         local = kinematics.local_rotations(turned, PARENTS)
         label = card.labels.index(self.action) if self.action else 0
-        answer = run_long(
-            card,
+        seen = Seen(
             sample_rotations(local, times),
             sample(root, times),
             known[before] & known[after],
-            label,
+            (label, mirrored(card.labels)[label] if label else 0),
             bones,
-            pinned(observation, body.mapping, len(times), card.fps / clip.fps, body.scale),
+            *pinned(observation, body.mapping, len(times), card.fps / clip.fps, body.scale),
         )
+        answer = run_long(card, seen)
         said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
         back = np.arange(len(clip))[missing] * card.fps / clip.fps
@@ -167,59 +170,104 @@ def pinned(
     return places, said
 
 
-def run(
-    path: Path,
-    local: np.ndarray,
-    root: np.ndarray,
-    known: np.ndarray,
-    label: int,
-    bones: np.ndarray,
-    pins: tuple[np.ndarray, np.ndarray],
-) -> Answer:
-    """Run the graph on one motion at 30 fps.
+@dataclass
+class Seen:
+    """What the network is given of a motion at 30 fps.
 
-    Args:
-        path: of the graph.
+    Attributes:
         local: (T, 22, 4) canonical rotations relative to the parent's.
         root: (T, 3) metres, the hips.
         known: (T, 23) booleans.
-        label: index of the action.
+        labels: index of the action, and of that of the mirror image.
         bones: (22, 3) metres.
-        pins: (T, 22, 3) metres, where joints are to be, and (T, 22) of which joints that is said.
+        places: (T, 22, 3) metres, where joints are to be.
+        pins: (T, 22) of which joints that is said.
     """
+
+    local: np.ndarray
+    root: np.ndarray
+    known: np.ndarray
+    labels: tuple[int, int]
+    bones: np.ndarray
+    places: np.ndarray
+    pins: np.ndarray
+
+    def part(self, frames: slice) -> Seen:
+        """Of some frames."""
+        names = ("local", "root", "known", "places", "pins")
+        return replace(self, **{name: getattr(self, name)[frames] for name in names})
+
+    def mirrored(self) -> Seen:
+        """The mirror image."""
+        sides, across = list(SIDES), ACROSS.values
+        return Seen(
+            self.local[:, sides] * ACROSS_TURN.values,
+            self.root * across,
+            self.known[:, [*sides, len(sides)]],
+            self.labels[::-1],
+            self.bones[sides] * across,
+            self.places[:, sides] * across,
+            self.pins[:, sides],
+        )
+
+
+def run(path: Path, *motions: Seen) -> list[Answer]:
+    """Run the graph on motions of one length."""
     # Far from the origin float32 would lose millimetres.
-    origin = root[np.argmax(known[:, -1])] * [1.0, 0.0, 1.0]
-    places, said = pins
-    feed = {
-        "local": np.where(known[:, :-1, None], local, [1.0, 0.0, 0.0, 0.0])[None].astype(np.float32),
-        "root": np.where(known[:, -1:], root - origin, 0.0)[None].astype(np.float32),
-        "known": known[None].astype(np.float32),
-        "pinned": np.where(said[..., None], places - origin, 0.0)[None].astype(np.float32),
-        "pins": said[None],
-        "label": np.array([label]),
-        "bones": bones[None].astype(np.float32),
-    }
-    names = ["local_out", "root_out", "contact", "error"]
-    turned, placed, stands, off = (out[0].astype(float) for out in weights.session(path).run(names, feed))
-    return Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
+    origins = [one.root[np.argmax(one.known[:, -1])] * [1.0, 0.0, 1.0] for one in motions]
+    feeds = [
+        {
+            "local": np.where(one.known[:, :-1, None], one.local, [1.0, 0.0, 0.0, 0.0]),
+            "root": np.where(one.known[:, -1:], one.root - origin, 0.0),
+            "known": one.known,
+            "pinned": np.where(one.pins[..., None], one.places - origin, 0.0),
+            "bones": one.bones,
+        }
+        for one, origin in zip(motions, origins)
+    ]
+    feed = {name: np.stack([one[name] for one in feeds]).astype(np.float32) for name in feeds[0]}
+    feed["pins"] = np.stack([one.pins for one in motions])
+    feed["label"] = np.array([one.labels[0] for one in motions])
+    said = weights.session(path).run(["local_out", "root_out", "contact", "error"], feed)
+    return [
+        Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
+        for turned, placed, stands, off, origin in zip(*(out.astype(float) for out in said), origins)
+    ]
 
 
-def run_long(
-    card: weights.Card,
-    local: np.ndarray,
-    root: np.ndarray,
-    known: np.ndarray,
-    label: int,
-    bones: np.ndarray,
-    pins: tuple[np.ndarray, np.ndarray],
-) -> Answer:
-    """Run the graph on a motion of any length, hole by hole; arguments and result as in `run`.
+def run_both(path: Path, motion: Seen) -> Answer:
+    """What the graph says of a motion, in the mean with what it says of the mirror image: so the mirror image
+    of a clip is completed as the mirror image of what the clip is, and errors are 2 to 4 % smaller.
+
+    Where the two disagree by more than a right angle their mean would be neither: then the one counts that
+    expects to err less.
+    """
+    own, image = run(path, motion, motion.mirrored())
+    sides, across = list(SIDES), ACROSS.values
+    other = Answer(
+        image.local[:, sides] * ACROSS_TURN.values,
+        image.root * across,
+        image.stands[:, FEET_ACROSS],
+        image.expected,
+    )
+    apart = rotations.angle(*(kinematics.global_rotations(one.local, PARENTS) for one in (own, other)))
+    if apart.max(initial=0.0) > AGREE:
+        return min(own, other, key=lambda one: float(one.expected.mean()))
+    return Answer(
+        rotations.normalize(own.local + rotations.alike(other.local, own.local)),
+        *((a + b) / 2 for a, b in zip(*((x.root, x.stands, x.expected) for x in (own, other)))),
+    )
+
+
+def run_long(card: weights.Card, motion: Seen) -> Answer:
+    """Run the graph on a motion of any length, hole by hole.
 
     A hole is seen with what is around it. Of one that is longer than the network can see, each window
     completes as much as half of it, which is taken as known from then on. What it says of feet and of errors
     it also says of the known frames around; far from any hole nothing does (NaN).
     """
-    local, root, known = local.copy(), root.copy(), known.copy()
+    local, root, known = motion.local.copy(), motion.root.copy(), motion.known.copy()
+    motion = replace(motion, local=local, root=root, known=known)
     stands, expected = np.full((len(root), len(FEET)), np.nan), np.full(len(root), np.nan)
     for begin, end in runs(np.logical_not(known.all(axis=1))):
         carried = 0.0  # what the frames that a window starts from are expected to be off by themselves
@@ -228,9 +276,7 @@ def run_long(
             last = min(end + CONTEXT, len(root)) if short else begin + card.max_gap
             first = max(begin - CONTEXT, 0)
             part = slice(first, last)
-            said = run(
-                card.onnx, local[part], root[part], known[part], label, bones, (pins[0][part], pins[1][part])
-            )
+            said = run_both(card.onnx, motion.part(part))
             stop = end if short else begin + max(card.max_gap // 2, 1)
             inside = slice(begin, stop)
             own = slice(begin - first, stop - first)

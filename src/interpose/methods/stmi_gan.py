@@ -12,10 +12,9 @@ from interpose.geometry.time import runs
 from interpose.methods import positional, weights
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
+from interpose.skeletons import ACROSS, SIDES
 from interpose.skeletons.body import facing
-from interpose.skeletons.canonical import SIDES
 
-ACROSS = np.array([-1.0, 1.0, 1.0])  # to the mirror image
 # A run of missing frames up to this share of a window is seen from both its ends at once.
 SHORT = 0.75
 
@@ -99,10 +98,10 @@ def run_both(
 ) -> tuple[np.ndarray, np.ndarray]:
     """As `run`, in the mean with what it says of the mirror image: left and right are one task, and it errs
     less by 4 % where joints are lost. Not for forecasts, whose mean moves less than people do."""
-    sides = list(SIDES)
-    image = run(card, positions[:, :, sides] * ACROSS, observed[:, :, sides], rng, temperature)
+    sides, across = list(SIDES), ACROSS.values
+    image = run(card, positions[:, :, sides] * across, observed[:, :, sides], rng, temperature)
     plain = run(card, positions, observed, rng, temperature)
-    raw, completed = (0.5 * (own + other[:, :, sides] * ACROSS) for own, other in zip(plain, image))
+    raw, completed = (0.5 * (own + other[:, :, sides] * across) for own, other in zip(plain, image))
     return raw, completed
 
 

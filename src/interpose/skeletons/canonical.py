@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from interpose.geometry.constant import Constant
+
 JOINTS = (
     "Hips",
     *("LeftUpLeg", "LeftLeg", "LeftFoot", "LeftToe"),
@@ -19,6 +21,10 @@ SIDES = tuple(
     JOINTS.index("Right" + n[4:] if n.startswith("Left") else "Left" + n[5:] if n.startswith("Right") else n)
     for n in JOINTS
 )
+# What positions and quaternions are multiplied with, once joints have changed sides, to be seen in a mirror
+# that stands in the plane X = 0.
+ACROSS = Constant([-1.0, 1.0, 1.0])
+ACROSS_TURN = Constant([1.0, 1.0, -1.0, -1.0])
 
 # Thigh plus shin in metres, of LAFAN1's actors: networks see every clip scaled to this leg.
 LEG_LENGTH = 0.8587

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -29,6 +30,15 @@ def _counterpart(name: str) -> list[str]:
     for hit in re.finditer(r"^[LlRr](?=[A-Za-z_])|(?<=[_.\-: ])[LlRr](?=$|[_.\- ])", name):
         found.append(name[: hit.start()] + swaps[hit.group()] + name[hit.end() :])
     return found
+
+
+def mirrored(labels: Sequence[str]) -> list[int]:
+    """For each action label that of the mirror image, by index, left for right; 0 where there is none."""
+
+    def swap(label: str) -> str:
+        return re.sub("left|right", lambda side: "right" if side[0] == "left" else "left", label)
+
+    return [labels.index(swap(label)) if swap(label) in labels else 0 for label in labels]
 
 
 def sides(skeleton: Skeleton) -> tuple[int, ...]:

@@ -6,7 +6,6 @@ points, sampled from a Gaussian process, along which the body is turned.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,13 +17,10 @@ from interpose.datasets import Pack
 from interpose.datasets.pack import STEP
 from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
-from interpose.geometry.constant import Constant
 from interpose.geometry.ground import turn
-from interpose.skeletons import PARENTS, SIDES
+from interpose.skeletons import ACROSS, ACROSS_TURN, PARENTS, SIDES
+from interpose.skeletons.mirror import mirrored
 from interpose.training.device import send
-from interpose.training.windows import MIRROR
-
-MIRROR_TURN = Constant([1.0, 1.0, -1.0, -1.0])  # of quaternions
 
 
 @dataclass
@@ -55,15 +51,6 @@ def labels_of(packs: Sequence[Pack], splits: Sequence[str]) -> tuple[str, ...]:
     """All labels of the clips of some splits, sorted; "" first, for motions without one."""
     found = {str(x) for pack in packs for x, s in zip(pack.labels, pack.splits) if s in splits}
     return ("", *sorted(found - {""}))
-
-
-def mirrored(labels: Sequence[str]) -> list[int]:
-    """For each label that of the mirrored motion, by index, left for right; 0 where there is none."""
-
-    def swap(label: str) -> str:
-        return re.sub("left|right", lambda side: "right" if side[0] == "left" else "left", label)
-
-    return [labels.index(swap(label)) if swap(label) in labels else 0 for label in labels]
 
 
 class Poses:
@@ -132,8 +119,8 @@ class Poses:
         if not mirror:
             return drawn
         flip = send(rng.random(batch) < 0.5, self.device)[:, None, None]
-        mirrored = drawn.rotation[:, :, self.sides] * MIRROR_TURN.beside(drawn.rotation)
-        side = MIRROR.beside(drawn.root)
+        mirrored = drawn.rotation[:, :, self.sides] * ACROSS_TURN.beside(drawn.rotation)
+        side = ACROSS.beside(drawn.root)
         return Batch(
             torch.where(flip[..., None], mirrored, drawn.rotation),
             torch.where(flip, drawn.root * side, drawn.root),

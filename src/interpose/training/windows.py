@@ -10,12 +10,10 @@ from torch import Tensor
 
 from interpose.datasets import Pack
 from interpose.errors import RequestError
-from interpose.geometry.constant import Constant
-from interpose.skeletons import SIDES
+from interpose.skeletons import ACROSS, SIDES
 from interpose.training.device import send
 
 STEP = 1 / 16384  # metres: positions relative to the hips in 16 bits reach 2 m at .06 mm
-MIRROR = Constant([-1.0, 1.0, 1.0])
 SHORTEST = 30  # frames; shorter clips do not train, longer ones than this are padded with their last pose
 
 
@@ -69,7 +67,7 @@ class Windows:
         positions = self.at(clip, first)
         if mirror:
             flip = send(rng.random(batch) < 0.5, self.device)[:, None, None, None]
-            mirrored = positions[:, :, self.sides] * MIRROR.beside(positions)
+            mirrored = positions[:, :, self.sides] * ACROSS.beside(positions)
             positions = torch.where(flip, mirrored, positions)
         return positions
 
