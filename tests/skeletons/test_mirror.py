@@ -38,7 +38,7 @@ def test_positions_are_mirrored_and_sides_swapped(axis, translated):
     swapped = [0, 3, 4, 1, 2, 5, 7, 6]
     expected = clip.positions()[:, swapped] * [-1, 1, 1]
     np.testing.assert_allclose(image.positions(), expected, atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(mirrored.rotation, axis=-1), 1)
+    np.testing.assert_allclose(np.linalg.norm(image.rotation, axis=-1), 1)
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
