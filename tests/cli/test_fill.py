@@ -291,15 +291,22 @@ def test_without_gaps_a_scan_decides(run, take):
 
 
 def test_scan(run, take):
-    assert "nothing looks missing" in run("scan", "take.bvh").out
-    assert run("scan", "take.bvh", "--json").json["findings"] == []
+    """A thumb of the walk is out of line in one frame."""
+    first = run("scan", "take.bvh").out
+    assert "lost" in first
+    assert "interpose recover take.bvh restores" in first
+    assert "interpose fill" not in first
+    (thumb,) = run("scan", "take.bvh", "--json").json["findings"]
+    assert (thumb["kind"], thumb["joints"]) == ("lost", ["RThumb"])
+    run("recover", "take.bvh", "--method", "spline")
+    assert "nothing looks missing" in run("scan", "take.recovered.bvh").out
     freeze(take)
     done = run("scan", "take.bvh")
     assert done.code == 0
-    assert "frozen" in done.out
-    (finding,) = run("scan", "take.bvh", "--json").json["findings"]
-    assert finding["kind"] == "frozen"
-    assert finding["frames"] in ("60:80", "61:80")
+    assert "interpose fill take.bvh" in done.out
+    found = run("scan", "take.bvh", "--json").json["findings"]
+    assert [one["kind"] for one in found] == ["lost", "frozen"]
+    assert found[1]["frames"] in ("60:80", "61:80")
 
 
 def freeze(path: Path) -> None:

@@ -132,6 +132,16 @@ def test_missing_values_are_listed_and_not_taken_for_frozen_ones():
     assert to_gaps(found) == [Gap(40, 60), Gap(80, 90, ("hand",))]
 
 
+def test_joints_that_drop_out_for_moments_are_found_and_are_no_gaps():
+    clip = motion()
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[30:32, 2:4] = SKELETON.rest_rotation[2:4]
+    translation[50] += [0, 5, 0]
+    found = scan(clip.with_motion(rotation, translation))
+    assert spans(found) == [("lost", ("arm", "hand"), 30, 32), ("lost", ("hips",), 50, 51)]
+    assert to_gaps(found) == []
+
+
 def test_a_rest_pose_before_the_motion_is_found():
     clip = motion()
     rotation = clip.rotation.copy()

@@ -8,9 +8,11 @@ from shlex import quote
 from interpose.cli.console import names, say, say_json, say_table, seconds
 from interpose.cli.reading import Reading, describe, details
 
+SHOWN = 10  # dropouts, of many
+
 
 def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
-    """Find what looks missing: frozen runs and stray rest poses.
+    """Find what looks missing: frozen runs, stray rest poses, joints that drop out for moments.
 
     Try:
       interpose scan take.bvh
@@ -41,18 +43,24 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say("nothing looks missing")
         return
     say()
+    dropped = [one for one in found if one.kind == "lost"]
+    shown = [one for one in found if one not in dropped[SHOWN:]]
     say_table(
         ("kind", "frames", "length", "joints", "note"),
         [
             (one.kind, f"{one.start}:{one.stop}", seconds(len(one), clip.fps), names(one.joints), one.note)
-            for one in found
+            for one in shown
         ],
         right=("frames", "length"),
     )
+    if len(found) > len(shown):
+        say(f"and {len(found) - len(shown)} more that are lost; --json lists them all")
     say()
     if to_gaps(found):
-        say(f"interpose fill {quote(str(file))} fills these; --gap START:STOP names one yourself.")
-    else:
+        say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
+    if dropped:
+        say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
+    if len(to_gaps(found)) + len(dropped) < len(found):
         say(
             "A position alone cannot be filled; name the frames of the whole pose with fill --gap START:STOP."
         )

@@ -1,4 +1,5 @@
-"""Finding what is missing in a clip that does not say so: frozen runs, and rest poses at the ends."""
+"""Finding what is missing in a clip that does not say so: frozen runs, rest poses at the ends, values that
+drop out."""
 
 from __future__ import annotations
 
@@ -9,6 +10,8 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
+from interpose.observation.broken import broken
 from interpose.observation.observation import Gap, Observation
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
@@ -27,6 +30,8 @@ OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
 # decimals stand still for long.
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
+# Kinds of findings that are no gaps.
+NO_GAPS = ("frozen position", "lost")
 
 
 @dataclass(frozen=True)
@@ -34,7 +39,7 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose" or "outlier".
+        kind: "missing", "frozen", "frozen position", "rest pose", "outlier" or "lost".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -63,6 +68,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose, jump or not.
     - "frozen position": the same for a root whose position stands still while the pose does not.
+    - "lost": joints that snap to their rest pose for up to a second, or spikes of up to three frames: what
+      `recover` restores.
 
     Joints that never move are not reported, nor are those that stand still for half of the clip at a stretch:
     they have no data to be filled from.
@@ -82,12 +89,14 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
                 first, last = (1, last) if frame == 0 else (first, last - 1)
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
+        findings += _lost(clip, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
-    """The gaps to fill. A frozen position is none: a gap cannot be in the root's position alone."""
-    return [Gap(f.start, f.stop, f.joints) for f in findings if f.kind != "frozen position"]
+    """The gaps to fill. A frozen position is none: a gap cannot be in the root's position alone. Nor are
+    values that drop out: `recover` finds them by itself."""
+    return [Gap(f.start, f.stop, f.joints) for f in findings if f.kind not in NO_GAPS]
 
 
 def _steps(clip: Clip, known: Observation) -> tuple[np.ndarray, np.ndarray]:
@@ -169,10 +178,10 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     together: dict[Run, list[int]] = {}
     for joint in alive.tolist():
         steps = turned[:, joint]
-        runs = list(_runs(still[:, joint] & ~whole, steps, JUMP_TURN))
-        if any(2 * (run.stop - run.start) >= len(steps) for run in runs):
+        pauses = list(_runs(still[:, joint] & ~whole, steps, JUMP_TURN))
+        if any(2 * (run.stop - run.start) >= len(steps) for run in pauses):
             continue  # no data but for some steps, like the fingers of many files
-        for run in runs:
+        for run in pauses:
             value = clip.rotation[first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
@@ -185,6 +194,22 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[clip.skeleton.roots[column]],), run)
     return found
+
+
+def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
+    """Values that drop out, but those that have been found already; joints that do so together are one."""
+    seen = broken(clip)
+    # Joints that stand still for most of the clip have no data to be restored from.
+    turned, _ = _steps(clip, Observation.full(clip))
+    lost = ~(seen.rotation & seen.translation) & ((turned > STILL).mean(axis=0) > 0.5)
+    for one in findings:
+        joints = slice(None) if one.joints is None else [clip.skeleton.index(name) for name in one.joints]
+        lost[one.start : one.stop, joints] = False
+    together: dict[tuple[int, int], list[str]] = {}
+    for name, column in zip(clip.skeleton.names, lost.T):
+        for run in runs(column):
+            together.setdefault(run, []).append(name)
+    return [Finding("lost", tuple(names), *run, "out of line at once") for run, names in together.items()]
 
 
 def _suspicious(run: Run, fps: float, pace: float) -> bool:
