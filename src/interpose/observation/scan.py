@@ -209,7 +209,7 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     for name, column in zip(clip.skeleton.names, lost.T):
         for run in runs(column):
             together.setdefault(run, []).append(name)
-    return [Finding("lost", tuple(names), *run, "out of line at once") for run, names in together.items()]
+    return [Finding("lost", tuple(names), *run, "jumps away and back") for run, names in together.items()]
 
 
 def _suspicious(run: Run, fps: float, pace: float) -> bool:
