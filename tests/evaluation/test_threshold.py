@@ -8,7 +8,6 @@ import pytest
 
 from interpose.cli import main
 from interpose.evaluation import threshold
-from interpose.methods import registry
 
 
 @pytest.fixture(autouse=True)
@@ -39,11 +38,10 @@ def test_a_method_is_measured_beside_the_spline(published):
     assert "zero-velocity is better than the spline from 31 frames on" in str(found)
 
 
-def test_on_the_command_line(published, tmp_path, monkeypatch, capsys):
-    """Where the spline holds still, straight lines beat it everywhere."""
-    plain = registry.get
-    monkeypatch.setattr(registry, "get", lambda name: plain({"spline": "zero-velocity"}.get(name, name)))
-    asked = ["bench", "threshold", "--data", str(published), "--network", "linear", "--most", "1", "--json"]
+def test_on_the_command_line(published, tmp_path, capsys):
+    asked = ["bench", "threshold", "--data", str(published), "--network", "small", "--most", "1", "--json"]
     assert main([*asked, "--plot", str(tmp_path / "curve.svg")]) == 0
-    assert json.loads(capsys.readouterr().out)["from_gap"] == 4
-    assert "<svg" in (tmp_path / "curve.svg").read_text()
+    said = json.loads(capsys.readouterr().out)
+    assert (said["gaps"], said["windows"]) == ([4, 12, 30], 1)
+    assert said["errors"]["small"][-1] < said["errors"]["spline"][-1]
+    assert "auto: network from here" in (tmp_path / "curve.svg").read_text()
