@@ -12,7 +12,7 @@ from interpose.cli.outputs import Outputs, to_json, write
 from interpose.cli.reading import Reading, describe, split_names
 from interpose.errors import RequestError
 
-UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm"}
+UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm", "turned": "degrees", "turned_most": "degrees"}
 
 
 def denoise(

@@ -137,12 +137,15 @@ def _report(
     clip: Clip, done: Clip, lost: np.ndarray, noise: np.ndarray, start: int, strength: float
 ) -> NoiseReport:
     moved = 100 * np.linalg.norm(done.positions() - clip.positions(), axis=-1)
+    turned = np.degrees(rotations.angle(done.rotation, clip.rotation))
     joints = tuple(
         JointNoise(
             name,
             100 * float(noise[j]),
             float(moved[:, j].mean()),
             float(moved[:, j].max()),
+            float(turned[:, j].mean()),
+            float(turned[:, j].max()),
             tuple(f"{start + a}:{start + b}" for a, b in runs(lost[:, j])),
         )
         for j, name in enumerate(clip.skeleton.names)
@@ -154,6 +157,8 @@ def _report(
         100 * float(noise.mean()),
         float(moved.mean()),
         float(moved.max()),
+        float(turned.mean()),
+        float(turned.max()),
         int(lost.sum()),
         lost.size,
         joints,

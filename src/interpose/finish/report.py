@@ -113,6 +113,8 @@ class JointNoise:
     noise: float
     moved: float
     moved_most: float
+    turned: float
+    turned_most: float
     broken: tuple[str, ...]
 
 
@@ -125,6 +127,7 @@ class NoiseReport:
         strength: what the estimated noise was multiplied with.
         noise: cm, the estimated standard deviation of the joints' positions along an axis, in the mean.
         moved, moved_most: cm, how far joints moved, in the mean and at most.
+        turned, turned_most: degrees, how far they turned against their parents.
         broken: how many values of joints were judged broken, and filled.
         values: how many there are: frames times joints.
         joints: each joint.
@@ -136,6 +139,8 @@ class NoiseReport:
     noise: float
     moved: float
     moved_most: float
+    turned: float
+    turned_most: float
     broken: int
     values: int
     joints: tuple[JointNoise, ...] = field(repr=False)
@@ -143,6 +148,7 @@ class NoiseReport:
     def __str__(self) -> str:
         shakiest = max(self.joints, key=lambda one: one.noise)
         furthest = max(self.joints, key=lambda one: one.moved_most)
+        twisted = max(self.joints, key=lambda one: one.turned_most)
         lossy = [one.joint for one in self.joints if one.broken]
         where = f", in {', '.join(lossy[:4])}" + f" +{len(lossy) - 4}" * (len(lossy) > 4) if lossy else ""
         return "\n".join(
@@ -153,6 +159,8 @@ class NoiseReport:
                 + "; filled" * (self.broken > 0 and self.strength > 0),
                 f"moved: joints by {self.moved:.2f} cm in the mean, at most by {self.moved_most:.2f} cm "
                 f"({furthest.joint})",
+                f"turned: joints by {self.turned:.2f} degrees in the mean, at most by {self.turned_most:.2f} "
+                f"({twisted.joint})",
             ]
         )
 
