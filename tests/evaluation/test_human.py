@@ -243,20 +243,25 @@ def test_a_person_votes(made, tmp_path):
     (tmp_path / "page.html").write_text(made.page.replace("</body>\n", PROBE), encoding="utf-8")
     options = ["--headless", "--no-sandbox"]
     options += ["--disable-gpu", "--disable-sync", "--disable-background-networking"]
-    options += ["--disable-component-update", "--virtual-time-budget=8000", "--dump-dom"]
-    options += [f"--user-data-dir={tmp_path / 'profile'}"]
-    try:
-        done = subprocess.run(
-            [BROWSER, *options, f"file://{tmp_path / 'page.html'}"],
-            capture_output=True,
-            text=True,
-            timeout=60,
-        )
-    except subprocess.TimeoutExpired:
-        pytest.skip("the browser does not start here")
-    if "<iframe" not in done.stdout:
-        pytest.skip("the browser does not start here")
-    out = json.loads(re.search(r'<textarea id="out">(.*?)</textarea>', done.stdout, re.S)[1])
+    options += ["--disable-component-update", "--dump-dom", f"--user-data-dir={tmp_path / 'profile'}"]
+    said = None
+    for patience in (8000, 60_000):  # milliseconds of the page's own clock: busy machines need more
+        try:
+            done = subprocess.run(
+                [BROWSER, *options, f"--virtual-time-budget={patience}", f"file://{tmp_path / 'page.html'}"],
+                capture_output=True,
+                text=True,
+                timeout=60,
+            )
+        except subprocess.TimeoutExpired:
+            pytest.skip("the browser does not start here")
+        if "<iframe" not in done.stdout:
+            pytest.skip("the browser does not start here")
+        said = re.search(r'<textarea id="out">(.*?)</textarea>', done.stdout, re.S)
+        if said:
+            break
+    assert said, "the page's script has not come to its end"
+    out = json.loads(said[1])
     assert out["frames"] == clips_of(made.page)[0]["frames"]
     assert (out["second"], out["third"], out["visible"]) == (2, 3, True)
     assert out["words"] == "That was all. Thank you!"

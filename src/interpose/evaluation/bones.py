@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from interpose.evaluation.infilling import DATASETS, in_words, named, origin
+from interpose.evaluation.infilling import in_words, named, origin
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.methods import cae
 from interpose.methods.weights import Card
 from interpose.show.plot import Box, box_plot

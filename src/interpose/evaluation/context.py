@@ -19,9 +19,8 @@ from typing import Any
 import numpy as np
 
 from interpose.datasets.catalogue import FPS
-from interpose.evaluation.infilling import DATASETS
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import Window, windows
+from interpose.evaluation.windows import DATASETS, Window, windows
 from interpose.finish import complete, measures
 from interpose.finish.guarantees import DULL
 from interpose.methods import auto, registry

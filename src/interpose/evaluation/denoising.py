@@ -20,14 +20,13 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import Window, windows
+from interpose.evaluation.windows import DATASETS, Window, windows
 from interpose.finish.denoise import denoised
 from interpose.finish.solve import solve
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.observation.corruption import gaussian_noise, joints_per_frame_mask
 
-DATASETS = ("lafan1", "bandai")
 UNIT = 0.0625  # metres: sigma 1
 # The paper's figures in cm: Holden et al. and its own network.
 PAPER = {"sigma 1.0": (5.0, 5.8), "sigma 1.5": (6.6, 7.8), "p .3": (6.5, 3.1), "p .5": (9.5, 4.0)}

@@ -17,14 +17,13 @@ from typing import Any
 import numpy as np
 
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import Window, windows
+from interpose.evaluation.windows import DATASETS, Window, windows
 from interpose.finish import complete
 from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
 
-DATASETS = ("lafan1", "bandai")
 FRAMES = 120
 LEGS = tuple(joint for limb in LIMBS for joint in limb if JOINTS[limb[0]].endswith("UpLeg"))
 

@@ -12,14 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from interpose.errors import FileError, RequestError
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.geometry.ground import turn
 from interpose.methods import stmi_gan, weights
 from interpose.methods.weights import Card
 from interpose.skeletons.body import facing
 from interpose.skeletons.humanoid import canonical_positions
 
-DATASETS = ("lafan1", "bandai")
 FPS, SEEN, AHEAD = 30, 60, 120  # frames a second, frames seen and frames ahead
 BATCH = 64  # motions at once
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import Window, windows
+from interpose.evaluation.windows import DATASETS, Window, windows
 from interpose.finish import complete, feet, measures
 from interpose.finish.guarantees import wipe
 from interpose.methods import registry
@@ -25,7 +25,6 @@ from interpose.methods.cae import Cae
 from interpose.methods.weights import Card
 from interpose.observation import Gap, Observation
 
-DATASETS = ("lafan1", "bandai")
 GAPS = (0, 15, 30, 60)
 PAPER = "linear, global positions"
 ROWS = (

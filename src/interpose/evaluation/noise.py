@@ -23,11 +23,11 @@ from typing import Any
 
 import numpy as np
 
-from interpose.evaluation.denoising import DATASETS, PAPER, UNIT
+from interpose.evaluation.denoising import PAPER, UNIT
 from interpose.evaluation.infilling import in_words, origin
 from interpose.evaluation.occlusion import linear
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.geometry.ground import turn
 from interpose.methods.weights import Card
 from interpose.observation.corruption import gaussian_noise, joints_per_frame_mask

@@ -25,14 +25,13 @@ from interpose.errors import RequestError, unknown
 from interpose.evaluation.forecasters import thin
 from interpose.evaluation.forecasting import named
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.methods import cae, stmi_gan, weights
 from interpose.methods.kalman import smooth
 from interpose.methods.weights import Card
 from interpose.observation import corruption
 from interpose.skeletons import JOINTS
 
-DATASETS = ("lafan1", "bandai")
 SECONDS = 4
 FPS = 30  # of windows
 RATES = (5, 30)  # frames a second at which they may be measured

@@ -17,12 +17,11 @@ from scipy.stats import spearmanr
 
 from interpose.errors import RequestError
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.finish.guarantees import wipe
 from interpose.methods import registry
 from interpose.show import line_plot
 
-DATASETS = ("lafan1", "bandai")
 GAPS = (5, 15, 30, 60)
 FRAMES, PARTS = 120, 10
 

@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from interpose.evaluation.infilling import DATASETS
 from interpose.evaluation.table import markdown
-from interpose.evaluation.windows import windows
+from interpose.evaluation.windows import DATASETS, windows
 from interpose.finish import complete
 from interpose.methods import registry
 from interpose.show.plot import line_plot

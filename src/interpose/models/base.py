@@ -179,13 +179,14 @@ class Block(nn.Module):
         self.outer = nn.Linear(4 * width, width)
         self.dropout = nn.Dropout(dropout)
 
-    def forward(self, x: Tensor, bias: Tensor | None) -> Tensor:
-        """x: (B, T, width); bias: (heads, T, T), added to how much frames attend to each other."""
-        asked = self.ask(self.norms[0](x)).unflatten(2, (3, self.heads, -1))
+    def forward(self, x: Tensor, bias: Tensor | None, batch: int) -> Tensor:
+        """x: (B T, width): of rows graphs add biases as they multiply; bias: (heads, T, T), added to how much
+        frames attend to each other; batch: B."""
+        asked = self.ask(self.norms[0](x)).unflatten(1, (3, self.heads, -1)).unflatten(0, (batch, -1))
         query, key, value = asked.permute(2, 0, 3, 1, 4).unbind(0)
         score = (query / math.sqrt(query.shape[-1])) @ key.transpose(2, 3)
         weight = torch.softmax(score if bias is None else score + bias.to(score.dtype), dim=-1)
-        told = (weight @ value).transpose(1, 2).flatten(2)
+        told = (weight @ value).transpose(1, 2).flatten(2).flatten(0, 1)
         x = x + self.dropout(self.say(told))
         deep = nn.functional.gelu(self.inner(self.norms[1](x)))
         return x + self.dropout(self.outer(deep))
@@ -254,9 +255,10 @@ class Encoder(nn.Module):
         if self.apart is not None:
             frame = torch.arange(seen.shape[1], device=x.device)
             bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
+        batch, x = len(x), x.flatten(0, 1)
         for block in self.blocks:
-            x = block(x, bias)
-        said: Tensor = self.say(self.norm(x))
+            x = block(x, bias, batch)
+        said: Tensor = self.say(self.norm(x)).unflatten(0, (batch, -1))
         return said
 
 
