@@ -176,3 +176,34 @@ def test_long_clips_are_resampled_in_blocks_that_agree(smooth, monkeypatch):
     blocks = time.resample(clip(100), 70, smooth)
     np.testing.assert_allclose(blocks.rotation, whole.rotation, atol=1e-12)
     np.testing.assert_allclose(blocks.translation, whole.translation, atol=1e-12)
+
+
+@pytest.mark.parametrize("step", [0.8, 1.0, 2.0, 3.3, 4.0])
+def test_a_grid_has_the_ends_of_what_is_known(step):
+    known = np.ones(300, bool)
+    known[111:203] = False
+    known[150] = True  # a key
+    known[250:299] = False
+    times = time.grid(known, step)
+    assert times[0] == 0
+    assert times[-1] == 299
+    for frame in (110, 150, 203, 249, 299):
+        assert np.abs(times - frame).min() < 1e-9
+    apart = np.diff(times)
+    assert (np.abs(apart / step - 1) < 0.1).all()
+
+
+def test_a_grid_at_the_same_rate_is_every_frame():
+    known = np.random.default_rng(0).random(100) < 0.5
+    assert np.array_equal(time.grid(known, 1.0), np.arange(100))
+    assert np.array_equal(time.grid(np.zeros(5, bool), 1.0), np.arange(5))
+    assert np.array_equal(time.grid(np.ones(1, bool), 4.0), [0])
+
+
+def test_a_grid_keeps_the_step_where_little_is_known():
+    """Velocities of the two or three frames around a gap are as fast as they are."""
+    known = np.zeros(100, bool)
+    known[:7] = known[30:36] = True
+    times = time.grid(known, 4.0)
+    assert {0.0, 4.0, 30.0, 34.0} <= set(times)
+    assert 6.0 not in times

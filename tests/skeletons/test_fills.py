@@ -11,6 +11,7 @@ from tests.skeletons import rigs
 from interpose import formats, tasks
 from interpose.finish import feet
 from interpose.geometry import rotations
+from interpose.geometry.time import resample
 from interpose.observation import Gap, Observation
 from interpose.skeletons import JOINTS, find_humanoid
 
@@ -103,8 +104,6 @@ def test_floors_that_are_not_at_zero(cmu_walk, height):
 
 @pytest.mark.parametrize("fps", [24, 48, 90, 240])
 def test_any_frame_rate_keeps_what_is_beside_the_gap(cmu_walk, fps):
-    from interpose.geometry.time import resample
-
     clip = resample(cmu_walk, fps)
     shaken = clip.with_motion(clip.rotation.copy(), clip.translation)
     shaken.rotation[::2, 5] = rotations.multiply(
@@ -118,6 +117,28 @@ def test_any_frame_rate_keeps_what_is_beside_the_gap(cmu_walk, fps):
         assert done.clip.rotation[part].tobytes() == shaken.rotation[part].tobytes()
     wrong = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1)[start:stop]
     assert wrong.mean() < 0.06
+
+
+@pytest.mark.parametrize("method", ["small", "cae"])
+def test_a_key_counts_wherever_it_lies_between_the_networks_frames(cmu_walk, method):
+    """At 120 fps three of four frames are none of a network's."""
+    clip = resample(cmu_walk, 120)
+    errors = []
+    for key in (300, 301, 302, 303):
+        done = tasks.fill(clip, [Gap(240, key), Gap(key + 1, 360)], method)
+        assert {gap.method for gap in done.report.gaps} == {method}
+        off = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1)
+        errors.append(100 * off[240:360].mean())
+    assert max(errors) < 1.3 * min(errors), errors
+
+
+def test_a_gap_begins_without_a_step_between_the_networks_frames(cmu_walk):
+    """Where the last known frame is none of its, what it says of the next one fits to it all the same."""
+    clip = resample(cmu_walk, 120)
+    for start in (240, 241, 242, 243):
+        done = tasks.fill(clip, [Gap(start, start + 100)], "small").clip
+        jump = np.linalg.norm(np.diff(done.positions(), 2, axis=0), axis=-1).max(axis=1)
+        assert jump[start - 2 : start + 1].max() < 2 * np.percentile(jump, 95)
 
 
 def test_a_guessed_skeleton_is_filled_as_a_named_one(cmu_walk):

@@ -490,10 +490,12 @@ def _lost(opinion: Clip, hidden: Clip, known: Observation, span: _Span) -> str |
 def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
     """How far a joint's velocity may jump inside a gap, in metres per frame squared.
 
-    Landings and kicks do so far beyond the limit of seams, so the observed motion around it is asked, too.
+    Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked. What no
+    body does is a glitch of the file, and no measure for anything.
     """
-    own = float(seams.own_jumps(hidden, known).max(initial=0.0))
-    return max(seams.PEAKS * limit, seams.OWN_PEAKS * own, SETS_OFF / hidden.fps**2)
+    own = seams.own_jumps(hidden, known)
+    own = own[own < TORN / hidden.fps**2]
+    return max(limit, seams.OWN_PEAKS * float(own.max(initial=0.0)), SETS_OFF / hidden.fps**2)
 
 
 def _excess(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> tuple[float, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 
 Array = Any
 
+# Steps in a run of known frames from which on they may be stretched.
+SPREAD = 5
 # Frames that are resampled at once.
 BLOCK = 4096
 
@@ -58,6 +61,29 @@ def sample_rotations(q: Array, times: Array) -> Array:
     before, after, t = _around(xp, q.shape[0], times)
     t = xp.astype(_column(t, q), q.dtype)
     return rotations.slerp(q[before], q[after], t)
+
+
+def grid(known: np.ndarray, step: float) -> np.ndarray:
+    """Times (n,), in frames, about `step` apart, among which are the ends of each run of `known` frames (F,).
+
+    A network at a lower frame rate would not see a key between two of its own frames, and not where exactly a
+    gap begins. So its steps are stretched or shortened until they end there; where much is known they hardly
+    change. Runs of few known frames keep the step, from their first one on, as it tells velocities.
+    """
+    last = len(known) - 1
+    ends: set[float] = {0, last}
+    for start, stop in runs(known):
+        whole = math.floor((stop - 1 - start) / step)
+        ends |= (
+            {start, stop - 1}
+            if whole >= SPREAD or step <= 1
+            else {start + step * i for i in range(whole + 1)}
+        )
+    at = sorted(ends)
+    pieces = [
+        np.linspace(a, b, max(1, round((b - a) / step)), endpoint=False) for a, b in zip(at[:-1], at[1:])
+    ]
+    return np.concatenate([*pieces, [float(last)]])
 
 
 def fade_out(t: Array, length: Array) -> Array:

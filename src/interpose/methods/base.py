@@ -11,6 +11,7 @@ from interpose.clip import Clip
 from interpose.errors import unknown
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.time import (
+    grid,
     runs,
     sample,
     sample_rotations,
@@ -76,7 +77,7 @@ class Base:
         base = Spline().complete(clip, observation).clip
         turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
         known = knowledge(observation, body.mapping)
-        times = np.round(np.arange(0, len(clip) - 0.5, clip.fps / card.fps), 9)
+        times = grid(np.asarray(known.all(axis=1)), clip.fps / card.fps)
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         local = kinematics.local_rotations(turned, PARENTS)
@@ -87,12 +88,12 @@ class Base:
             known[before] & known[after],
             (label, mirrored(card.labels)[label] if label else 0),
             bones,
-            *pinned(observation, body.mapping, len(times), card.fps / clip.fps, body.scale),
+            *pinned(observation, body.mapping, times, body.scale),
         )
         answer = run_long(card, seen)
         said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
-        back = np.arange(len(clip))[missing] * card.fps / clip.fps
+        back = np.interp(np.arange(len(clip))[missing], times, np.arange(len(times)))
         # What is known of a frame is exactly so; only what is not is the network's.
         turns = rotations.normalize(sample_rotations_smooth(rotations.continuous(said), back))
         own = kinematics.local_rotations(turns, PARENTS)
@@ -153,19 +154,19 @@ def knowledge(observation: Observation, mapping: Mapping) -> np.ndarray:
 
 
 def pinned(
-    observation: Observation, mapping: Mapping, frames: int, pace: float, scale: float
+    observation: Observation, mapping: Mapping, times: np.ndarray, scale: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where pins say that canonical joints are (T, 22, 3), in metres of the scaled body, and of which (T, 22)
     they do.
 
-    pace: frames of the network to one of the clip; a pin speaks of the nearest one.
+    times: of the network's frames (T), in frames of the clip; a pin speaks of the nearest one.
     """
     rows = {joint: row for row, joint in zip(*mapping.mapped)}
-    places, said = np.zeros((frames, len(PARENTS), 3)), np.zeros((frames, len(PARENTS)), bool)
+    places, said = np.zeros((len(times), len(PARENTS), 3)), np.zeros((len(times), len(PARENTS)), bool)
     for pin in observation.pins:
         row = rows.get(mapping.skeleton.index(pin.joint))
         if row is not None and pin.position is not None:
-            at = np.minimum(np.round(np.asarray(pin.frames) * pace).astype(int), frames - 1)
+            at = np.round(np.interp(pin.frames, times, np.arange(len(times)))).astype(int)
             places[at, row], said[at, row] = np.asarray(pin.position) * scale, True
     return places, said
 

@@ -9,7 +9,7 @@ from scipy import interpolate, ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.geometry.time import sample, sample_smooth
+from interpose.geometry.time import grid, sample, sample_smooth
 from interpose.methods import weights
 from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
@@ -90,8 +90,8 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     positions = body.as_canonical(clip)
     coarse, step = card.fps < COARSE, clip.fps / card.fps
     # A coarse one says one frame more where the clip ends between two of its own.
-    stop = len(clip) - 1 + step if coarse else len(clip) - 0.5
-    times = np.round(np.arange(0, stop, step), 9)
+    even = np.round(np.arange(0, len(clip) - 1 + step, step), 9)
+    times = even if coarse else grid(np.asarray(known.all(axis=1)), step)
     before, after = (np.minimum(of(times).astype(int), len(clip) - 1) for of in (np.floor, np.ceil))
     seen = known[before] & known[after] & (times < len(clip))[:, None]
     poses, raw, completed = network(sample(positions, times), seen)
@@ -99,7 +99,7 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     completed = np.where(seen[..., None], completed, calm)
     drift = _drift(observation, raw, completed, times, body)
     # Past the last frame of the network's nothing is known of it: that frame is held.
-    back = np.minimum(np.arange(len(clip)) * card.fps / clip.fps, len(times) - 1)
+    back = np.interp(np.arange(len(clip)), times, np.arange(len(times)))
     like = body.rotations(base)
     ahead = rotations.about("Y", -facing(body.as_canonical(base)))[:, None]
     if coarse:

@@ -255,7 +255,7 @@ class Encoder(nn.Module):
         if self.apart is not None:
             frame = torch.arange(seen.shape[1], device=x.device)
             bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
-        batch, x = len(x), x.flatten(0, 1)
+        batch, x = x.shape[0], x.flatten(0, 1)  # len() would be a constant in graphs
         for block in self.blocks:
             x = block(x, bias, batch)
         said: Tensor = self.say(self.norm(x)).unflatten(0, (batch, -1))
