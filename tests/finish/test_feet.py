@@ -7,6 +7,7 @@ import pytest
 
 from interpose.clip import Clip
 from interpose.finish import complete, feet, measures
+from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 
@@ -138,6 +139,23 @@ def test_a_foot_in_the_air_tells_nothing_of_the_floor(walk, shown):
         known[start : start + shown] = True
         floor = feet.local_floor(placed, known, walk.fps)[start + shown // 2]
         assert np.abs(floor - true).max() < 0.03
+
+
+def test_a_leg_that_is_never_known_stands_where_the_other_does(walk):
+    """And a foot that goes through the floor is named with its frame."""
+    leg = [walk.skeleton.index("Left" + part) for part in ("UpLeg", "Leg", "Foot", "ToeBase")]
+    known = Observation.from_gaps(walk, [Gap(0, len(walk), tuple(walk.skeleton.names[j] for j in leg))])
+    positions = walk.positions()
+    joints = feet.pairs(walk.skeleton)
+    floor = feet.local_floor(positions[:, joints], known.positions(walk.skeleton)[:, joints], walk.fps)
+    assert np.array_equal(floor[:, 0], floor[:, 1])
+    assert feet.sunk(walk, known, 0, len(walk))[0] < 0.03
+    rotation = walk.rotation.copy()
+    rotation[40, leg[1]] = rotations.identity()
+    rotation[40, leg[2]] = rotations.multiply(rotation[40, leg[2]], rotations.about("X", np.array(1.2)))
+    depth, joint, frame = feet.sunk(walk.with_motion(rotation, walk.translation), known, 0, len(walk))
+    assert depth > 0.05
+    assert (walk.skeleton.names[joint], frame) == ("LeftToeBase", 40)
 
 
 def test_measures_of_feet():

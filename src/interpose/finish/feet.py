@@ -115,7 +115,29 @@ def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
                 rests.append(_rest(heights, seen, still & seen, leg))
         own = feet[:, leg, end, 1]
         floor[:, leg, end] = np.interp(np.arange(len(feet)), at, rests) if at else np.percentile(own, 5)
+    # What is never observed rests where the same joint of another foot does.
+    told = np.asarray(known.any(axis=0))
+    for leg, end in np.ndindex(told.shape):
+        if told[:, end].any() and not told[leg, end]:
+            floor[:, leg, end] = floor[:, int(np.argmax(told[:, end])), end]
     return floor
+
+
+def sunk(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int] | None:
+    """How far below the floor the deepest ankle or toe is that is not observed, in metres beyond those that
+    are; which joint, and at which of the frames start to stop - 1. None without any."""
+    joints = pairs(clip.skeleton)
+    if not joints.size:
+        return None
+    feet, grown = clip.positions()[:, joints], size(clip.skeleton)
+    seen = known.positions(clip.skeleton)[:, joints]
+    depth = grown * local_floor(feet / grown, seen, clip.fps) - feet[..., 1]
+    usual = float(depth[seen].max(initial=0.0))
+    free = np.where(seen, -np.inf, depth)[start:stop]
+    if not np.isfinite(free).any():
+        return None
+    frame, leg, end = np.unravel_index(int(free.argmax()), free.shape)
+    return float(free[frame, leg, end]) - usual, int(joints[leg, end]), start + int(frame)
 
 
 def _rest(heights: np.ndarray, seen: np.ndarray, still: np.ndarray, leg: int) -> float:

@@ -40,6 +40,8 @@ DOUBT = 0.15
 BESIDE, SHARE = 0.25, 1 / 6
 # A share of all joints: so many laid on a body are most of it.
 MOST = 0.5
+# Metres below the floor at which a foot is asked about.
+SUNK = 0.05
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
 # A path on which the root goes this much further than without it is said to be too long.
@@ -693,6 +695,7 @@ def _report(
         notes=(
             *span.notes,
             *((inside[1],) if inside and inside[1] else ()),
+            *_sunk(finished, known, gap, first),
             *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
             *(
                 (_doubtful(risk, gap, first, gap.stop == len(finished)),)
@@ -704,6 +707,18 @@ def _report(
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
     )
+
+
+def _sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """A note where a foot goes through the floor."""
+    near = round(feet.NEARBY * finished.fps)
+    lo, hi = max(gap.start - near, 0), min(gap.stop + near, len(finished))
+    found = feet.sunk(finished.slice(lo, hi), known.slice(lo, hi), gap.start - lo, gap.stop - lo)
+    if found is None or found[0] < SUNK * feet.size(finished.skeleton):
+        return []
+    depth, joint, frame = found
+    name = finished.skeleton.names[joint]
+    return [f"flagged: {name} is {100 * depth:.0f} cm under the floor at frame {first + lo + frame}"]
 
 
 def _liveliness(finished: Clip, gap: Gap) -> float | None:
