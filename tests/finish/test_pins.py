@@ -46,7 +46,7 @@ def test_feet_stay_and_velocities_do_not_jump(cmu_walk):
     hand = cmu_walk.skeleton.index("LeftHand")
     assert moved[85, hand] > 0.3
     jumps = np.linalg.norm(np.diff(done.positions(), n=2, axis=0), axis=-1)[GAP.start - 1 : GAP.stop]
-    assert jumps.max() < 16 * seams.limit(cmu_walk, seen)
+    assert jumps.max() < 2 * seams.PEAKS * seams.limit(cmu_walk, seen)
 
 
 def test_a_place_is_held_for_as_long_as_it_is_pinned(cmu_walk):

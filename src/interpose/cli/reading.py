@@ -78,6 +78,10 @@ def describe(path: Path, clip: Clip) -> list[str]:
     return [f"{path}: {size}", *(f"  {line}" for line in (*lines, understood(clip)))]
 
 
+# Metres that legs may be long: of a toddler, and of a giant.
+PERSON = 0.15, 3.0
+
+
 def understood(clip: Clip) -> str:
     """How the skeleton is understood, in a line."""
     from interpose.skeletons import find_humanoid
@@ -93,7 +97,9 @@ def understood(clip: Clip) -> str:
     }
     way = ways[body.mapping.surely]
     hand = ", left-handed" if body.left_handed else ""
-    return f"skeleton: a humanoid, {len(body.mapping.mapped[0])} of 22 joints found {way}{hand}"
+    leg = body.mapping.leg_length
+    odd = "" if PERSON[0] < leg < PERSON[1] else f"; its leg is {leg:.3g} m long: check --unit"
+    return f"skeleton: a humanoid, {len(body.mapping.mapped[0])} of 22 joints found {way}{hand}{odd}"
 
 
 def details(clip: Clip) -> dict[str, Any]:

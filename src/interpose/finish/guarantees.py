@@ -497,7 +497,8 @@ def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
     """
     own = seams.own_jumps(hidden, known)
     own = own[own < TORN / hidden.fps**2]
-    return max(limit, seams.OWN_PEAKS * float(own.max(initial=0.0)), SETS_OFF / hidden.fps**2)
+    peak = seams.OWN_PEAKS * float(own.max(initial=0.0))
+    return max(seams.PEAKS * limit, peak, SETS_OFF / hidden.fps**2)
 
 
 def _excess(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> tuple[float, str]:
