@@ -142,6 +142,19 @@ def test_joints_that_drop_out_for_moments_are_found_and_are_no_gaps():
     assert to_gaps(found) == []
 
 
+def test_a_leg_that_never_moves_is_found_by_the_other(cmu_walk):
+    """And filled; where both stand still nobody knows better."""
+    names = cmu_walk.skeleton.names
+    leg = tuple(name for name in names if name in ("LeftUpLeg", "LeftLeg", "LeftFoot"))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, [names.index(name) for name in leg]] = cmu_walk.skeleton.rest_rotation[0]
+    found = scan(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert ("frozen", leg, 0, len(cmu_walk)) in spans(found)
+    assert Gap(0, len(cmu_walk), leg) in to_gaps(found)
+    rotation[:, [names.index(name.replace("Left", "Right")) for name in leg]] = [1, 0, 0, 0]
+    assert not [f for f in scan(cmu_walk.with_motion(rotation, cmu_walk.translation)) if f.kind == "frozen"]
+
+
 def test_a_rest_pose_before_the_motion_is_found():
     clip = motion()
     rotation = clip.rotation.copy()

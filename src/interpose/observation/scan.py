@@ -13,12 +13,15 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.observation import Gap, Observation
+from interpose.skeletons import SIDES, find_mapping
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
 # trembles by 1e-4 and more; files keep about 1e-8.
 STILL = 1e-6
 # A joint that turns less than this in the whole clip (radians) has no data at all, like most fingers.
 LIFELESS = 1e-3
+# A joint whose like on the other side turns this much in the whole clip (radians) has data, too, or had.
+LIVELY = 1.0
 # Frozen runs shorter than this many seconds are as good as noise; at least 3 frames.
 SHORTEST = 0.1
 # A joint that stands still without a jump at either end may be at the limit of a hinge: only after a second.
@@ -71,8 +74,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "lost": joints that snap to their rest pose for up to a second, or spikes of up to three frames: what
       `recover` restores.
 
-    Joints that never move are not reported, nor are those that stand still for half of the clip at a stretch:
-    they have no data to be filled from.
+    Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
+    those that stand still for half of the clip at a stretch: they have no data to be filled from.
     """
     findings: list[Finding] = []
     known = observation or Observation.full(clip)
@@ -89,6 +92,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
                 first, last = (1, last) if frame == 0 else (first, last - 1)
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
+        findings += _dead(clip, turned)
         findings += _lost(clip, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
@@ -194,6 +198,22 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[clip.skeleton.roots[column]],), run)
     return found
+
+
+def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
+    """Joints of a humanoid that never move, while the same ones of the other side do: one finding."""
+    total, mapping = np.nansum(turned, axis=0), find_mapping(clip.skeleton)
+    dead = [
+        joint
+        for joint, side in zip(mapping.joints, SIDES)
+        if joint is not None
+        and (other := mapping.joints[side]) is not None
+        and total[joint] <= LIFELESS
+        and total[other] > LIVELY
+        and np.isfinite(turned[:, joint]).all()
+    ]
+    names = tuple(clip.skeleton.names[joint] for joint in sorted(dead))
+    return [Finding("frozen", names, 0, len(clip), "the other side moves")] if dead else []
 
 
 def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
