@@ -178,3 +178,14 @@ def test_what_is_refused(cmu_walk, arguments, what):
     with pytest.raises(RequestError, match=what) as error:
         tasks.denoise(cmu_walk, **arguments)
     assert len(str(error.value).splitlines()) == 3
+
+
+@pytest.mark.parametrize("start", [30, 45])
+def test_a_foot_on_its_way_at_an_end_of_the_clip_stays_there(cmu_walk, start):
+    """What is around an end lies on one side of it: that a foot is far from it says nothing."""
+    clip = cmu_walk.slice(start, start + 80)
+    noisy = tremble(clip, 2.0, np.random.default_rng(0))
+    ends = feet.ends(clip.skeleton)
+    off = _apart(interpose.denoise(noisy).clip, clip)[:, ends]
+    assert off[[0, -1]].max() < 1.5 * off.max(axis=1)[3:-3].max()
+    assert off[[0, -1]].max() < 8

@@ -150,7 +150,7 @@ def _rest(heights: np.ndarray, seen: np.ndarray, still: np.ndarray, leg: int) ->
     return float(min(other, lowest[leg]))
 
 
-def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray:
+def contacts(positions: np.ndarray, floor: np.ndarray, fps: float, step: float = STEP) -> np.ndarray:
     """(F, n) True while an ankle or toe (F, n, 3) is planted: slow (with hysteresis), low, not too short."""
     speeds = measures.speed(positions, fps)
     low = positions[..., 1] < floor + HIGH
@@ -160,7 +160,7 @@ def contacts(positions: np.ndarray, floor: np.ndarray, fps: float) -> np.ndarray
         for start, stop in runs(possible[:, joint]):
             way = positions[start:stop, joint][:, [0, 2]] - positions[start, joint, [0, 2]]
             moved = np.linalg.norm(way, axis=1).max()
-            if certain[start:stop, joint].any() and stop - start >= SHORT * fps and moved < STEP:
+            if certain[start:stop, joint].any() and stop - start >= SHORT * fps and moved < step:
                 planted[start:stop, joint] = True
     return planted
 
@@ -192,6 +192,7 @@ def plant(
     span: tuple[int, int],
     blend: float = BLENDS[0],
     stands: np.ndarray | None = None,
+    step: float = STEP,
 ) -> Clip:
     """Hold the feet during contacts in the span, and keep them above the floor.
 
@@ -205,6 +206,7 @@ def plant(
         stands: (F, 4) how likely left ankle and toe, right ankle and toe stand, 0 to 1, by the method that
             made the motion: a foot is held where it is slow and low, unless this says that it does not stand.
             NaN, and None, where it says nothing.
+        step: metres; what moves further while it is slow and low is a step, and no stance.
     """
     skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
@@ -226,7 +228,7 @@ def plant(
         if not movable.any():
             continue
         feet, floor = both[:, number], floors[:, number]
-        planted = contacts(feet, floor, clip.fps)
+        planted = contacts(feet, floor, clip.fps, step)
         if stands is not None:
             said = stands[:, 2 * leg.side : 2 * leg.side + 2]
             planted &= ~(said < LIKELY)
