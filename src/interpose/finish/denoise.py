@@ -50,7 +50,7 @@ NOTHING = 1e-9
 SHAKY, AROUND, FAR = 0.005, 3, 2.5
 # Real feet stand, other than networks': what moves further than this (metres), or than so many deviations of
 # its noise, is a step.
-STANCE, STRAYS = 0.1, 5.0
+STANCE, STRAYS = 0.1, 3.0
 # Seconds over which the result goes over into the frames before and after a range.
 BLEND = 0.2
 
