@@ -45,7 +45,7 @@ def denoise(
         file: the clip (.bvh, .npz, .amc).
         strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
-        frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0. All without it.
+        frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0; or seconds, 4s:5.3s.
         method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
@@ -63,8 +63,8 @@ def denoise(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
     check_method(method, license)
-    part = range_of(frames) if frames is not None else None
     clip = reading.load(file)
+    part = range_of(frames, clip) if frames is not None else None
     outputs = Outputs.choose(file, output, "denoised", player)
     outputs.check(file, force)
     with progress(f"denoising {file.name}", len(clip)):

@@ -63,7 +63,7 @@ def fill(
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        gap: START:STOP, the frames START to STOP - 1, counted from 0. May be repeated.
+        gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip; or those that --from gives.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
         from_: another clip of the same character that gives poses of the --joints inside of a gap.

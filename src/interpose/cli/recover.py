@@ -44,7 +44,7 @@ def recover(
     Args:
         file: the clip (.bvh, .npz, .amc).
         joints: the joints, separated by commas; without any, those that drop out.
-        frames: START:STOP, the frames START to STOP - 1, counted from 0. All without it.
+        frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
         output: where to write the clip; the report goes beside it.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
@@ -64,7 +64,7 @@ def recover(
         )
     check_method(method, license)
     clip = reading.load(file)
-    gap = range_of(frames, chosen) if frames is not None else Gap(0, len(clip), chosen)
+    gap = range_of(frames, clip, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
     for name in chosen or ():
         clip.skeleton.index(name)

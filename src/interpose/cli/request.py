@@ -65,7 +65,7 @@ def from_options(
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
-    listed = [Gap.parse(text, chosen) for text in ranges]
+    listed = [Gap.parse(text, chosen, clip) for text in ranges]
     if gaps is not None:
         if chosen and not ranges:
             why = "the file says which joints are missing"
@@ -152,12 +152,12 @@ def _frames(text: str) -> Gap:
         ) from None
 
 
-def range_of(text: str, joints: tuple[str, ...] | None = None) -> Gap:
+def range_of(text: str, clip: Clip, joints: tuple[str, ...] | None = None) -> Gap:
     """The gap that --frames names; RequestError when it cannot be read."""
     try:
-        return Gap.parse(text, joints)
+        return Gap.parse(text, joints, clip)
     except RequestError as error:
-        fix = "Write --frames 120:160 for the frames 120 to 159."
+        fix = "Write --frames 120:160 for the frames 120 to 159, or --frames 4s:5.3s."
         raise RequestError(f"cannot read --frames {text}", error.why.replace("a gap", "it"), fix) from None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
@@ -30,18 +31,30 @@ class Gap:
         return f"{self.start}:{self.stop}" + (f" {','.join(self.joints)}" if self.joints else "")
 
     @classmethod
-    def parse(cls, text: str, joints: tuple[str, ...] | None = None) -> Gap:
-        """A gap from "120:160", frames 120 to 159. Raises RequestError for anything else."""
-        start, colon, stop = text.strip().partition(":")
-        try:
-            if not colon:
+    def parse(cls, text: str, joints: tuple[str, ...] | None = None, clip: Clip | None = None) -> Gap:
+        """A gap from "120:160", frames 120 to 159. Raises RequestError for anything else.
+
+        Of a clip also from seconds, "4s:5.3s", and without one of its ends: "120:" is open to the clip's end.
+        """
+        first, colon, last = text.strip().partition(":")
+
+        def frame(said: str, end: int) -> int:
+            if clip is None or not (said == "" or said.endswith("s")):
+                return int(said)
+            seconds = float(said[:-1]) if said else 0.0
+            if not math.isfinite(seconds):
                 raise ValueError
-            return cls(int(start), int(stop), joints)
+            return round(seconds * clip.fps) if said else end
+
+        try:
+            if not colon or (clip is not None and not first + last):
+                raise ValueError
+            return cls(frame(first, 0), frame(last, 0 if clip is None else len(clip)), joints)
         except ValueError:
             raise RequestError(
                 f"cannot read the gap {text!r}",
                 "a gap is a range of frames START:STOP, and STOP is the first frame after it",
-                "Write --gap 120:160 for the frames 120 to 159.",
+                "Write --gap 120:160 for the frames 120 to 159, or --gap 4s:5.3s.",
             ) from None
 
     def check(self, frames: int) -> Gap:
