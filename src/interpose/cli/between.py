@@ -54,7 +54,7 @@ def between(
         keys: the frames of the file that are keys, separated by commas, counted from 0.
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
-        frames: how many frames to generate between --start and --target; auto proposes a number.
+        frames: how many frames to generate between --start and --target; auto, the default, proposes it.
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
         action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
@@ -73,8 +73,8 @@ def between(
     said = ""
     if file is not None and not (start or target or frames or anchor):
         chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
-    elif file is None and not keys and start and target and frames is not None:
-        file, chosen, clip, said = _blocked(start, target, frames, anchor, reading)
+    elif file is None and not keys and start and target:
+        file, chosen, clip, said = _blocked(start, target, frames or "auto", anchor, reading)
     else:
         raise RequestError(
             "it is not clear what the keys are",
