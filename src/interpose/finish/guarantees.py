@@ -34,10 +34,9 @@ DULL = 0.33
 # Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
 # gaps of a second.
 DOUBT = 0.15
-# What should be known on either side of a gap for a network to fill it well: so many seconds, and this share
-# of the gap (Kaufmann et al. 2020, section 4.2: a sixth, for walks). Errors of validation performers are then
-# within 10 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
-BESIDE, SHARE = 0.25, 1 / 6
+# Seconds that should be known on either side of a gap for a network to fill it well. Errors of validation
+# performers are then within 6 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
+BESIDE = 0.1
 # A share of all joints: so many laid on a body are most of it.
 MOST = 0.5
 # Metres below the floor at which a foot is asked about.
@@ -767,7 +766,7 @@ def _scant(known: Observation, gap: Gap, fps: float) -> str | None:
     at = next(i for i, (start, stop) in enumerate(holes) if start <= gap.start < stop)
     before, after = holes[at][0] - holes[at - 1][1], holes[at + 1][0] - holes[at][1]
     length = holes[at][1] - holes[at][0]
-    enough = math.ceil(max(BESIDE * fps, SHARE * length))
+    enough = math.ceil(BESIDE * fps)
     if length <= enough or not 2 <= min(before, after) < enough:
         return None
     few = [f"{n} frames {side} it" for n, side in ((before, "before"), (after, "after")) if n < enough]
