@@ -226,7 +226,7 @@ def test_recover_finds_nothing_in_a_clean_clip(run, take):
     save(clip, Path("clean.bvh"))
     done = run("recover", "clean.bvh")
     assert done.code == 2
-    assert "interpose scan" in done.err
+    assert "--joints LeftArm" in done.err
     assert not Path("clean.recovered.bvh").exists()
 
 
@@ -304,6 +304,9 @@ def test_scan(run, take):
     done = run("scan", "take.bvh")
     assert done.code == 0
     assert "interpose fill take.bvh" in done.out
+    done = run("recover", "take.bvh", "--force")
+    assert "left as they are: all 6" in done.out, "from frame 60 or 61 on"
+    assert "interpose fill take.recovered.bvh fills them" in done.out
     found = run("scan", "take.bvh", "--json").json["findings"]
     assert [one["kind"] for one in found] == ["lost", "frozen"]
     assert found[1]["frames"] in ("60:80", "61:80")

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 from cyclopts import Parameter
 
-from interpose.cli.console import progress, say
+from interpose.cli.console import names, progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
+
+SHOWN = 4  # losses, of many
 
 
 def recover(
@@ -31,7 +34,7 @@ def recover(
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
     Without --joints it finds what drops out: joints that snap to their rest pose for up to
-    a second, and spikes, at any frames. `interpose scan` finds longer losses.
+    a second, and spikes, at any frames; what is lost for longer is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -56,6 +59,7 @@ def recover(
     from interpose import tasks
     from interpose.cli.request import check_method, range_of
     from interpose.observation import Gap
+    from interpose.observation.scan import NO_GAPS, scan
 
     chosen = split_names(joints) if joints else None
     if chosen is not None and not chosen:
@@ -72,15 +76,18 @@ def recover(
     outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
+    longer = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if chosen is None else []
     if not (done.report.gaps or done.report.moments):
+        fix = "Name joints that are lost for longer: --joints LeftArm."
         raise RequestError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose for up to a second, and none spikes",
-            "Longer losses: interpose scan finds them, and --joints LeftArm names them.",
+            f"interpose fill {file} fills what is lost for longer." if longer else fix,
         )
     code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
-    if chosen is None and not json:
-        say(
-            "Losses of more than a second are not looked for: interpose scan finds them, --joints names them."
-        )
+    if longer and not json:
+        lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in longer[:SHOWN]]
+        more = f" and {len(longer) - SHOWN} more" if len(longer) > SHOWN else ""
+        say(f"Lost for longer, and left as they are: {', '.join(lost)}{more}")
+        say(f"interpose fill {quote(str(outputs.clip))} fills them; interpose scan lists them.")
     return code
