@@ -207,3 +207,11 @@ def test_a_grid_keeps_the_step_where_little_is_known():
     times = time.grid(known, 4.0)
     assert {0.0, 4.0, 30.0, 34.0} <= set(times)
     assert 6.0 not in times
+
+
+def test_a_grid_stays_one_where_frames_drop_out_everywhere():
+    """Of known frames that are nearer to each other than its step it takes one."""
+    known = np.random.default_rng(1).random(200) < 0.4
+    apart = np.diff(time.grid(known, 4.0))
+    assert apart.min() > 2
+    assert apart.max() < 6.1

@@ -35,10 +35,12 @@ from interpose.training.base import (  # noqa: E402
     JUDGED,
     STANDS,
     TASKS,
+    TYPICAL,
     BaseSettings,
     Losses,
     chosen,
     draw_task,
+    relief,
     spoil,
     train_base,
     validate,
@@ -357,6 +359,16 @@ def test_losses_are_of_what_is_wrong(drawn):
     least = parts(shift=0.001, risk=best)["risk"]
     assert least < parts(shift=0.001, risk=best - 1)["risk"]
     assert least < parts(shift=0.001, risk=best + 1)["risk"]
+
+
+def test_a_batch_is_as_hard_as_its_starting_point_is_wrong(drawn):
+    placed, known = drawn.positions(), torch.ones(2, 40, COUNT + 1)
+    known[:, 10:30] = 0
+    begun = placed.clone()
+    begun[:, 10:30, :, 1] += 2 * TYPICAL
+    begun[:, :10] += 9.0  # what is known does not count
+    assert relief(begun, placed, known).item() == pytest.approx(2, abs=0.02)
+    assert 0 < relief(placed, placed, known).item() < 0.02
 
 
 def test_noise_is_in_what_is_noisy_alone(drawn):

@@ -20,6 +20,8 @@ Array = Any
 
 # Steps in a run of known frames from which on they may be stretched.
 SPREAD = 5
+# Steps that two ends are apart at least.
+CLOSE = 0.6
 # Frames that are resampled at once.
 BLOCK = 4096
 
@@ -68,7 +70,8 @@ def grid(known: np.ndarray, step: float) -> np.ndarray:
 
     A network at a lower frame rate would not see a key between two of its own frames, and not where exactly a
     gap begins. So its steps are stretched or shortened until they end there; where much is known they hardly
-    change. Runs of few known frames keep the step, from their first one on, as it tells velocities.
+    change. Runs of few known frames keep the step, from their first one on, as it tells velocities; what is
+    nearer to such an end than a good half of a step is left out.
     """
     last = len(known) - 1
     ends: set[float] = {0, last}
@@ -79,7 +82,12 @@ def grid(known: np.ndarray, step: float) -> np.ndarray:
             if whole >= SPREAD or step <= 1
             else {start + step * i for i in range(whole + 1)}
         )
-    at = sorted(ends)
+    at = [0.0]
+    for end in sorted(ends)[1:]:
+        if end - at[-1] >= CLOSE * step:
+            at.append(end)
+    if last > at[-1]:
+        at[max(1, len(at) - 1) :] = [last]  # the end of all is always one
     pieces = [
         np.linspace(a, b, max(1, round((b - a) / step)), endpoint=False) for a, b in zip(at[:-1], at[1:])
     ]
