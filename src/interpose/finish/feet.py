@@ -125,13 +125,18 @@ def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
 
 def sunk(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int] | None:
     """How far below the floor the deepest ankle or toe is that is not observed, in metres beyond those that
-    are; which joint, and at which of the frames start to stop - 1. None without any."""
+    are; which joint, and at which of the frames start to stop - 1. None without any.
+
+    The floor is no higher than the lowest joint that is observed: on hands feet tell nothing of it.
+    """
     joints = pairs(clip.skeleton)
-    if not joints.size:
+    observed = known.positions(clip.skeleton)
+    if not joints.size or not observed.any():
         return None
-    feet, grown = clip.positions()[:, joints], size(clip.skeleton)
-    seen = known.positions(clip.skeleton)[:, joints]
-    depth = grown * local_floor(feet / grown, seen, clip.fps) - feet[..., 1]
+    positions, grown = clip.positions(), size(clip.skeleton)
+    feet, seen = positions[:, joints], observed[:, joints]
+    floor = np.minimum(grown * local_floor(feet / grown, seen, clip.fps), positions[observed, 1].min())
+    depth = floor - feet[..., 1]
     usual = float(depth[seen].max(initial=0.0))
     free = np.where(seen, -np.inf, depth)[start:stop]
     if not np.isfinite(free).any():
