@@ -109,7 +109,7 @@ class Cmib:
         length = len(gap) * self.card.fps / clip.fps
         if length > self.card.max_gap:
             at = f"{length:.0f} frames at {self.card.fps:g} fps"
-            return f"{at} are more than the {self.card.max_gap} it can fill"
+            return f"{at} are more than the {self.card.max_gap} it can fill: give keys inside of them"
         return None
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:

@@ -45,7 +45,7 @@ def refuses(clip: Clip, gap: Gap, card: weights.Card) -> str | None:
     length = len(gap) * card.fps / clip.fps
     if gap.joints is None and length > card.max_gap:
         at = f"{length:.0f} frames at {card.fps:g} fps"
-        return f"{at} are more than the {card.max_gap} it can fill"
+        return f"{at} are more than the {card.max_gap} it can fill: give keys inside of them"
     return None
 
 
