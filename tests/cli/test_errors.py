@@ -240,10 +240,10 @@ def test_control_c_in_a_process(tmp_path):
         except OSError:  # nobody reads yet
             time.sleep(0.02)
     # Once more if it was just where Python ignores exceptions, as in a callback of the garbage collector.
-    for wait in (20, 20, 20):
+    for _ in range(8):
         process.send_signal(signal.SIGINT)
         try:
-            out, err = process.communicate(timeout=wait)
+            out, err = process.communicate(timeout=8)
             break
         except subprocess.TimeoutExpired:
             continue
