@@ -305,8 +305,8 @@ def test_scan(run, take):
     assert done.code == 0
     assert "interpose fill take.bvh" in done.out
     done = run("recover", "take.bvh", "--force")
-    assert "left as they are: all 6" in done.out, "from frame 60 or 61 on"
-    assert "interpose fill take.recovered.bvh fills them" in done.out
+    assert "left as it is: all 6" in done.out, "from frame 60 or 61 on"
+    assert "interpose fill take.recovered.bvh fills it" in done.out
     found = run("scan", "take.bvh", "--json").json["findings"]
     assert [one["kind"] for one in found] == ["lost", "frozen"]
     assert found[1]["frames"] in ("60:80", "61:80")

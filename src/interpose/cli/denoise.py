@@ -46,6 +46,7 @@ def denoise(
         strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
         frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0; or seconds, 4s:5.3s.
+            All without it.
         method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.

@@ -34,7 +34,7 @@ def recover(
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
     Without --joints it finds what drops out: joints that snap to their rest pose for up to
-    a second, and spikes, at any frames; what is lost for longer is listed, and `interpose fill` fills it.
+    a second, and spikes, at any frames; what else is missing is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -76,18 +76,18 @@ def recover(
     outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
-    longer = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if chosen is None else []
+    others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if chosen is None else []
     if not (done.report.gaps or done.report.moments):
         fix = "Name joints that are lost for longer: --joints LeftArm."
         raise RequestError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose for up to a second, and none spikes",
-            f"interpose fill {file} fills what is lost for longer." if longer else fix,
+            f"interpose fill {file} fills what else is missing." if others else fix,
         )
     code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
-    if longer and not json:
-        lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in longer[:SHOWN]]
-        more = f" and {len(longer) - SHOWN} more" if len(longer) > SHOWN else ""
-        say(f"Lost for longer, and left as they are: {', '.join(lost)}{more}")
-        say(f"interpose fill {quote(str(outputs.clip))} fills them; interpose scan lists them.")
+    if others and not json:
+        lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others[:SHOWN]]
+        more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+        say(f"Missing, too, and left as it is: {', '.join(lost)}{more}")
+        say(f"interpose fill {quote(str(outputs.clip))} fills it; interpose scan lists all.")
     return code

@@ -200,7 +200,8 @@ def _bounded(positions: np.ndarray, near: np.ndarray) -> np.ndarray:
     """Positions (F, n, 3), each brought as near as `near` (n,) metres to the median of those around it."""
     if not np.isfinite(near).any():
         return positions
-    off = positions - (middle := medians(positions, AROUND, "reflect"))
+    middle = medians(positions, AROUND, "reflect")
+    off = positions - middle
     # At the ends what is around lies on one side: whoever moves is far from it.
     off[:AROUND] = off[len(off) - AROUND :] = 0.0
     far = np.maximum(np.linalg.norm(off, axis=-1) / near, 1.0)
