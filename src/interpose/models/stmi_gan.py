@@ -8,9 +8,12 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
+import numpy as np
 import torch
+from scipy import interpolate
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -33,8 +36,8 @@ class StmiGanConfig:
     Attributes:
         frames: of a window.
         fps: at which it thinks; 20 frames of 4 s in the paper.
-        together: frames, one after the other, that are encoded into one; one in the paper.
-        width: values that these are encoded into, four for each coordinate of a frame in the paper.
+        together: frames, one after the other, that are a row of the image; one in the paper.
+        width: values that a row is encoded into, four for each coordinate of a frame in the paper.
         gates: gated blocks of the frame encoder, and of the decoder.
         blocks: U-blocks one after the other.
         channels: of the levels of a U-block, each half as large as the one before.
@@ -65,10 +68,10 @@ class StmiGanConfig:
 
 
 PAPER = StmiGanConfig()
-# For users: 4 s at 30 fps, with one more level to see as much time. At that rate a frame says little that
-# the one before it does not: four are encoded into as many values as they have coordinates, which takes half
-# the time of an image with a row for each.
-DENSE = StmiGanConfig(frames=120, fps=30.0, together=4, channels=(32, 64, 96, 96))
+# For users: 4 s at 30 fps. The image is the paper's, a row for each fifth of a second; what a row says is a
+# curve's pose there, and how each of its six frames differs from the curve. With poses of its own for each
+# frame a network trembles, by which its discriminator tells it at once.
+DENSE = StmiGanConfig(frames=120, fps=30.0, together=6)
 CONFIGS = {"paper": PAPER, "dense": DENSE}
 
 
@@ -212,6 +215,17 @@ def settle(answer: Tensor, positions: Tensor, observed: Tensor) -> Tensor:
     return torch.where(observed[..., None], positions, moved)
 
 
+@cache
+def curve(rows: int, together: int) -> Constant:
+    """(rows * together, rows) what poses in the middles of rows weigh in each frame: a natural spline."""
+    middles = np.arange(rows) * together + (together - 1) / 2
+    spline = interpolate.CubicSpline(middles, np.eye(rows), bc_type="natural")
+    frames = np.arange(rows * together)
+    inside = np.clip(frames, middles[0], middles[-1])
+    # Before the first of them and after the last one it is straight.
+    return Constant(spline(inside) + (frames - inside)[:, None] * spline(inside, 1))
+
+
 class Generator(nn.Module):
     """A frame encoder, U-blocks on what it writes, and a frame decoder, within the alignment (section 4.1).
 
@@ -225,10 +239,10 @@ class Generator(nn.Module):
     def __init__(self, config: StmiGanConfig = PAPER) -> None:
         super().__init__()
         self.config = config
-        values = config.together * VALUES
-        self.encoder = FrameNetwork(2 * values, config.width, config.gates)
+        said = VALUES if config.together == 1 else (1 + config.together) * VALUES
+        self.encoder = FrameNetwork(2 * config.together * VALUES, config.width, config.gates)
         self.blocks = nn.ModuleList(UBlock(config.channels) for _ in range(config.blocks))
-        self.decoder = FrameNetwork(config.width, config.width, config.gates, values)
+        self.decoder = FrameNetwork(config.width, config.width, config.gates, said)
         # One for each axis, as in the public code.
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
@@ -242,18 +256,31 @@ class Generator(nn.Module):
         write, copy, read = self.encoder[0], self.decoder[0], self.decoder[-1]
         assert all(isinstance(layer, nn.Linear) for layer in (write, copy, read))
         together = self.config.together
-        around = pose.flatten().repeat(together)
+        around = pose.flatten()
         with torch.no_grad():
             # (together, coordinates or whether they are known, ...) is how the input is laid out.
             values, known = write.weight.unflatten(1, (together, 2, VALUES)).unbind(2)
-            into = nn.init.orthogonal_(torch.empty_like(read.weight.T))
-            values.copy_(into.view_as(values))
-            known.copy_((-into * around).view_as(known))
-            read.weight.copy_(into.T)
+            into = nn.init.orthogonal_(torch.empty_like(read.weight[:VALUES].T))
+            values.copy_(into[:, None] / together)
+            known.copy_(-into[:, None] / together * around)
+            nn.init.zeros_(read.weight)[:VALUES] = into.T
             nn.init.eye_(copy.weight)
-            for layer in (write, copy):
+            for layer in (write, copy, read):
                 nn.init.zeros_(layer.bias)
-            read.bias.copy_(around)
+            read.bias[:VALUES] = around
+
+    def grow(self, other: Generator) -> None:
+        """Start with what a network of single frames says of the mean pose of each row, along a curve."""
+        assert other.config.together == 1
+        held = other.state_dict()
+        write, read = "encoder.0.weight", f"decoder.{len(self.decoder) - 1}"
+        together = self.config.together
+        held[write] = held[write].repeat(1, together) / together
+        for name, value in self.state_dict().items():
+            if name.startswith(read):
+                value[:VALUES], value[VALUES:] = held[name], 0.0
+            else:
+                value.copy_(held[name])
 
     @property
     def noises(self) -> int:
@@ -264,9 +291,11 @@ class Generator(nn.Module):
         """What the frame encoder writes of aligned motions: (B, rows, width)."""
         x = torch.where(observed, (motion - self.mean) / self.std, 0.0)
         given = torch.cat([x.flatten(2), observed.flatten(2).to(x.dtype)], dim=2)
-        written: Tensor = self.encoder(
-            given.unflatten(1, (self.config.rows, self.config.together)).flatten(2)
-        )
+        given = given.unflatten(1, (self.config.rows, self.config.together))
+        # What is known of a row in some of its frames counts as much as if it were known in all of them.
+        count = given[..., VALUES:].sum(dim=2, keepdim=True).clamp(min=1)
+        given = given * torch.cat([self.config.together / count] * 2, dim=3)
+        written: Tensor = self.encoder(given.flatten(2))
         return written
 
     def aligned(self, motion: Tensor, observed: Tensor, noise: Tensor) -> Tensor:
@@ -275,8 +304,12 @@ class Generator(nn.Module):
         for block, part in zip(self.blocks, noise.chunk(self.config.blocks, dim=1)):
             image = block(image, part)
         said = self.decoder(image[:, 0])
-        answer = said.unflatten(2, (self.config.together, len(JOINTS), 3)).flatten(1, 2)
-        return answer * self.std + self.mean
+        together = self.config.together
+        if together > 1:
+            poses, apart = said.split([VALUES, together * VALUES], dim=2)
+            weights = curve(self.config.rows, together).beside(poses)
+            said = weights @ poses + apart.unflatten(2, (together, VALUES)).flatten(1, 2)
+        return said.unflatten(2, (len(JOINTS), 3)) * self.std + self.mean
 
     def forward(self, positions: Tensor, observed: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
         """Complete motions.
@@ -342,6 +375,7 @@ class Discriminator(nn.Module):
 
     `base` looks at poses as an encoder of its own writes them, `edm` at the distances between joints,
     `motion` at the steps of both coordinates and distances from frame to frame (section 4.1).
+    All look at one frame of each row.
     """
 
     mean: Tensor
@@ -353,9 +387,7 @@ class Discriminator(nn.Module):
         self.config = config
         heights = {"base": config.width, "edm": len(ENDS), "motion": VALUES + len(ENDS)}
         self.encoder = FrameNetwork(VALUES, config.width, config.gates)
-        self.branches = nn.ModuleDict(
-            {name: Residual(config.together, heights[name]) for name in config.branches}
-        )
+        self.branches = nn.ModuleDict({name: Residual(1, heights[name]) for name in config.branches})
         self.score = nn.Linear(3 * 64 * max(len(config.branches), 1), 1)
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
@@ -363,7 +395,7 @@ class Discriminator(nn.Module):
         self.register_buffer("sizes", torch.ones(3))
 
     def seen(self, motion: Tensor) -> dict[str, Tensor]:
-        """What each branch looks at of aligned motions (B, T, 22, 3) in metres: (B, T or T - 1, H)."""
+        """What each branch looks at of aligned motions (B, rows, 22, 3): (B, rows or rows - 1, H)."""
         apart = distances(motion)
         steps = torch.cat(
             [motion.diff(dim=1).flatten(2) / self.sizes[1], apart.diff(dim=1) / self.sizes[2]], dim=2
@@ -375,11 +407,9 @@ class Discriminator(nn.Module):
         }
         return {name: found[name] for name in self.config.branches}
 
-    def image(self, rows: Tensor) -> Tensor:
-        """What is seen of frames (B, T or T - 1, H), those that go together as colours: (B, C, rows, H)."""
-        missing = self.config.frames - rows.shape[1]
-        padded = functional.pad(rows, (0, 0, 0, missing))
-        return padded.unflatten(1, (self.config.rows, self.config.together)).transpose(1, 2)
+    def image(self, frames: Tensor) -> Tensor:
+        """What is seen of frames (B, rows or rows - 1, H) as an image (B, 1, rows, H)."""
+        return functional.pad(frames, (0, 0, 0, self.config.rows - frames.shape[1]))[:, None]
 
     def forward(self, seen: dict[str, Tensor]) -> Tensor:
         said = [

@@ -8,7 +8,9 @@ The rows of its table 1 are settings of it:
     +EDM disc      branches=base,edm
     +Motion disc   branches=base,motion
 
-The losses are sums over a motion of 20 frames, as in the paper; longer ones count as much as those.
+The network of 30 frames a second, `config=dense`, says all frames; the losses and the discriminator look at
+one at random of each fifth of a second, as the paper's, so that it is not told by a tremble from frame to
+frame. It begins with what the paper's has learned: `--start stmi-gan --set config=dense`.
 """
 
 from __future__ import annotations
@@ -32,7 +34,6 @@ from interpose.models.stmi_gan import (
     CONFIGS,
     ENDS,
     FIRST,
-    PAPER,
     SECOND,
     Discriminator,
     Frame,
@@ -102,7 +103,8 @@ def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> 
 
     That is one of: whole frames, joints or limbs all along, single coordinates, each kept with a probability
     of .25 to .75. The first and the last frame stay. Where frames are dense, forecasts begin after a sixth to
-    two thirds of the motion, for clips that are short, and gaps are one kind more.
+    two thirds of the motion, for clips that are short, joints and limbs are lost for a while as often as all
+    along, and gaps are one kind more.
     """
     frames, joints, dense = settings.network.frames, len(JOINTS), settings.config == "dense"
     known = np.ones((batch, frames, joints, 3), bool)
@@ -111,6 +113,7 @@ def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> 
             motion[rng.integers(frames // 6, 2 * frames // 3) if dense else frames // 2 :] = False
             continue
         keep = rng.uniform(0.25, 0.75)
+        hole = gap_mask(rng, 1, frames, joints, frames / 4, frames / 8)[0, ..., None]
         kinds = ("frames", "joints", "limbs", "values", *(("gap",) if dense else ()))
         kind = kinds[rng.integers(len(kinds))]
         if kind == "frames":
@@ -123,31 +126,34 @@ def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> 
         elif kind == "values":
             motion[:] = rng.random(motion.shape) < keep
         else:
-            motion[:] = gap_mask(rng, 1, frames, joints, frames / 4, frames / 8)[0, ..., None]
+            motion[:] = hole
+        if dense and kind in ("joints", "limbs") and rng.random() < 0.5:
+            motion |= hole
         motion[[0, -1]] = True
     return known
 
 
 def draw(rng: np.random.Generator, windows: Windows, settings: StmiGanSettings, batch: int) -> Tensor:
-    """Motions (B, T, 22, 3) in metres of bodies small and tall, half of them mirrored.
-
-    Of 4 s the paper's network sees one frame at random of each block of ten: of six at 30 fps.
-    """
+    """Motions (B, T, 22, 3) in metres of bodies small and tall, half of them mirrored."""
     positions = windows.draw(rng, batch)
-    frames = settings.network.frames
-    block = windows.length // frames
-    if block > 1:
-        chosen = np.arange(frames) * block + rng.integers(block, size=(batch, frames))
-        index = send(chosen, positions.device)
-        positions = positions[torch.arange(batch, device=positions.device)[:, None], index]
+    # Of 4 s the paper's network sees one frame at random of each fifth of a second.
+    (positions,) = glance(rng, settings.network.frames, positions)
     # As often smaller than taller: .7 to 1.3, as in the paper.
     tall = rng.uniform(2.0 - settings.tallest, settings.tallest, batch)
     return positions * send(tall.astype(np.float32), positions.device)[:, None, None, None]
 
 
+def glance(rng: np.random.Generator, rows: int, *motions: Tensor) -> list[Tensor]:
+    """One frame at random of each part of motions (B, T, ...), the same of all of them: (B, rows, ...)."""
+    batch, frames = motions[0].shape[:2]
+    block = frames // rows
+    chosen = send(np.arange(rows) * block + rng.integers(block, size=(batch, rows)), motions[0].device)
+    return [motion[torch.arange(batch, device=motion.device)[:, None], chosen] for motion in motions]
+
+
 @dataclass
 class Motions:
-    """What is trained on: aligned motions (B, T, 22, 3), what is observed of them, and the network's."""
+    """What is trained on: aligned motions (B, rows, 22, 3), what is observed of them, and the network's."""
 
     truth: Tensor
     observed: Tensor
@@ -177,7 +183,7 @@ class Game:
         truth = Frame.of(positions, observed).align(positions)
         with torch.autocast(truth.device.type, torch.bfloat16):
             made = self.generator.aligned(truth, observed, noise(self.generator, len(truth), truth.device))
-        return Motions(truth, observed, made.float())
+        return Motions(*glance(rng, self.settings.network.rows, truth, observed, made.float()))
 
     def opponent_loss(self, rng: np.random.Generator, fraction: float) -> Tensor:
         """Of the discriminator: which motions are the data's, and the R1 penalty on those (equation 4).
@@ -214,7 +220,7 @@ class Game:
 
     def told(self, motions: Motions) -> Tensor:
         """What the truth tells: visible coordinates, distances of the extremities, and lengths of bones."""
-        asked, frames = self.settings, motions.truth.shape[1]
+        asked = self.settings
         seen = motions.observed if asked.looks else torch.ones_like(motions.observed)
         wrong = torch.where(seen, (motions.made - motions.truth) / self.generator.std, 0.0)
         size = self.generator.std.mean()
@@ -223,11 +229,10 @@ class Game:
         whole = seen.all(dim=-1)
         pairs = whole[..., FIRST.beside(off)] & whole[..., SECOND.beside(off)]
         limbs, bones = LIMB_PAIRS.beside(off), BONE_PAIRS.beside(off)
-        per = PAPER.frames / frames
         return (
-            asked.reconstruction * per * (wrong.square().sum(dim=3) + 1e-12).sqrt().sum(dim=(1, 2)).mean()
-            + asked.limbs * per * (off[..., limbs] * pairs[..., limbs]).sum(dim=(1, 2)).mean()
-            + asked.bones * per * off[..., bones].sum(dim=(1, 2)).mean()
+            asked.reconstruction * (wrong.square().sum(dim=3) + 1e-12).sqrt().sum(dim=(1, 2)).mean()
+            + asked.limbs * (off[..., limbs] * pairs[..., limbs]).sum(dim=(1, 2)).mean()
+            + asked.bones * off[..., bones].sum(dim=(1, 2)).mean()
         )
 
 
@@ -249,6 +254,7 @@ def fit_normaliser(
         network.mean.copy_(motion.mean(dim=(0, 1, 2)))
         network.std.copy_(motion.std(dim=(0, 1, 2)))
     generator.begin((motion.mean(dim=(0, 1)) - generator.mean) / generator.std)
+    (motion,) = glance(rng, settings.network.rows, motion)
     apart = distances(motion)
     found = (apart, motion.diff(dim=1), apart.diff(dim=1))
     discriminator.sizes.copy_(torch.stack([value.square().mean().sqrt() for value in found]))
@@ -275,7 +281,9 @@ def train_stmi_gan(
     held_out = Windows(packs, ("validation",), 120, device).spread(96)
     generator, discriminator = (make(settings.network).to(device) for make in (Generator, Discriminator))
     fit_normaliser(generator, discriminator, windows, settings)
-    if start:
+    if start and settings.network.together > 1 and start.training["network"]["together"] == 1:
+        generator.grow(trained(start))
+    elif start:
         restore(generator, start.onnx)
     if device.type == "cpu":
         quicken(generator)
