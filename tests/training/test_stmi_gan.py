@@ -141,6 +141,16 @@ def test_the_penalty_reaches_every_branch(windows):
     assert all(p.grad is None for p in play.generator.parameters())
 
 
+def test_the_discriminator_may_learn_alone_at_first(windows):
+    play = game(windows, lead=0.1)
+    rng = np.random.default_rng(0)
+    play.opponent_loss(rng, 0.05).backward()
+    play.loss(rng, 0.05).backward()
+    assert not any(p.grad is not None and p.grad.any() for p in play.generator.parameters())
+    play.loss(rng, 0.1).backward()
+    assert any(p.grad is not None and p.grad.any() for p in play.generator.parameters())
+
+
 @pytest.mark.parametrize("changes", [{"branches": "base,sound"}, {"config": "large"}])
 def test_settings_that_are_none(changes):
     with pytest.raises(RequestError, match=r"base, edm, motion|paper"):
