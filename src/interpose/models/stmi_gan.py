@@ -68,9 +68,8 @@ class StmiGanConfig:
 
 
 PAPER = StmiGanConfig()
-# For users: 4 s at 30 fps. The image is the paper's, a row for each fifth of a second; what a row says is a
-# curve's pose there, and how each of its six frames differs from the curve. With poses of its own for each
-# frame a network trembles, by which its discriminator tells it at once.
+# For users: 4 s at 30 fps. The image is the paper's, a row for each fifth of a second; of rows are said poses
+# on a curve. With something to say of each frame a network trembles, and passes that off as motion.
 DENSE = StmiGanConfig(frames=120, fps=30.0, together=6)
 CONFIGS = {"paper": PAPER, "dense": DENSE}
 
@@ -239,10 +238,9 @@ class Generator(nn.Module):
     def __init__(self, config: StmiGanConfig = PAPER) -> None:
         super().__init__()
         self.config = config
-        said = VALUES if config.together == 1 else (1 + config.together) * VALUES
         self.encoder = FrameNetwork(2 * config.together * VALUES, config.width, config.gates)
         self.blocks = nn.ModuleList(UBlock(config.channels) for _ in range(config.blocks))
-        self.decoder = FrameNetwork(config.width, config.width, config.gates, said)
+        self.decoder = FrameNetwork(config.width, config.width, config.gates, VALUES)
         # One for each axis, as in the public code.
         self.register_buffer("mean", torch.zeros(3))
         self.register_buffer("std", torch.ones(3))
@@ -260,27 +258,21 @@ class Generator(nn.Module):
         with torch.no_grad():
             # (together, coordinates or whether they are known, ...) is how the input is laid out.
             values, known = write.weight.unflatten(1, (together, 2, VALUES)).unbind(2)
-            into = nn.init.orthogonal_(torch.empty_like(read.weight[:VALUES].T))
+            into = nn.init.orthogonal_(torch.empty_like(read.weight.T))
             values.copy_(into[:, None] / together)
             known.copy_(-into[:, None] / together * around)
-            nn.init.zeros_(read.weight)[:VALUES] = into.T
+            read.weight.copy_(into.T)
             nn.init.eye_(copy.weight)
-            for layer in (write, copy, read):
+            for layer in (write, copy):
                 nn.init.zeros_(layer.bias)
-            read.bias[:VALUES] = around
+            read.bias.copy_(around)
 
     def grow(self, other: Generator) -> None:
         """Start with what a network of single frames says of the mean pose of each row, along a curve."""
         assert other.config.together == 1
-        held = other.state_dict()
-        write, read = "encoder.0.weight", f"decoder.{len(self.decoder) - 1}"
-        together = self.config.together
+        held, write, together = other.state_dict(), "encoder.0.weight", self.config.together
         held[write] = held[write].repeat(1, together) / together
-        for name, value in self.state_dict().items():
-            if name.startswith(read):
-                value[:VALUES], value[VALUES:] = held[name], 0.0
-            else:
-                value.copy_(held[name])
+        self.load_state_dict(held)
 
     @property
     def noises(self) -> int:
@@ -304,11 +296,8 @@ class Generator(nn.Module):
         for block, part in zip(self.blocks, noise.chunk(self.config.blocks, dim=1)):
             image = block(image, part)
         said = self.decoder(image[:, 0])
-        together = self.config.together
-        if together > 1:
-            poses, apart = said.split([VALUES, together * VALUES], dim=2)
-            weights = curve(self.config.rows, together).beside(poses)
-            said = weights @ poses + apart.unflatten(2, (together, VALUES)).flatten(1, 2)
+        if self.config.together > 1:
+            said = curve(self.config.rows, self.config.together).beside(said) @ said
         return said.unflatten(2, (len(JOINTS), 3)) * self.std + self.mean
 
     def forward(self, positions: Tensor, observed: Tensor, noise: Tensor) -> tuple[Tensor, Tensor]:
