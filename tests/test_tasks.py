@@ -377,6 +377,20 @@ def test_joints_lost_for_moments_are_found_and_interpolated(cmu_walk):
     assert off.mean() < 0.3 < 10 < before.mean()
 
 
+def test_a_rest_pose_that_leads_a_file_is_no_lost_joints(cmu_walk):
+    """As it leads the BVH files of CMU's library: `scan` names it, and `fill` mends it."""
+    rotation, skeleton = cmu_walk.rotation.copy(), cmu_walk.skeleton
+    elbow = skeleton.index("LeftForeArm")
+    rotation[0] = skeleton.rest_rotation
+    rotation[10:70:7, elbow] = skeleton.rest_rotation[elbow]
+    clip = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    done = tasks.recover(clip)
+    assert {(one.joint, frame) for one in done.report.moments for frame in one.frames} == {
+        ("LeftForeArm", f"{frame}:{frame + 1}") for frame in range(10, 70, 7)
+    }
+    assert np.array_equal(done.clip.rotation[0], rotation[0])
+
+
 def test_only_frames_asked_for_are_recovered(cmu_walk):
     noisy, _ = dropped(cmu_walk, 0.1)
     done = tasks.recover(noisy, frames=(40, 60))

@@ -30,6 +30,7 @@ from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken
 from interpose.observation.part import lay
+from interpose.observation.scan import strays
 from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
@@ -220,7 +221,8 @@ def recover(
     """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
 
     Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose, and
-    spikes, at any frames. Other arguments, result and errors are those of `fill`.
+    spikes, at any frames but a first or last one that is no part of the motion as a whole: that `scan` finds,
+    and `fill` mends. Other arguments, result and errors are those of `fill`.
     """
     start, stop = frames or (0, len(clip))
     if joints is None:
@@ -229,6 +231,7 @@ def recover(
         seen = broken(clip)
         outside = np.ones(len(clip), bool)
         outside[start:stop] = False
+        outside[strays(clip)] = True
         seen.rotation[outside], seen.translation[outside] = True, True
         return fill(clip, seen, method, seed=seed, progress=progress)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)

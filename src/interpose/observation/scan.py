@@ -84,17 +84,21 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     if len(clip) > 2:
         turned, moved = _steps(clip, known)
         first, last = 0, len(clip)
-        for frame, step in ((0, 0), (len(clip) - 1, len(turned) - 1)):
-            kind = _outlier(clip, turned, frame, step)
-            if kind:
-                note = f"nothing to do with the frame {'after' if frame == 0 else 'before'} it"
-                findings.append(Finding(kind, None, frame, frame + 1, note))
-                first, last = (1, last) if frame == 0 else (first, last - 1)
+        for stray in _strays(clip, turned):
+            findings.append(stray)
+            first, last = (1, last) if stray.start == 0 else (first, last - 1)
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
         findings += _lost(clip, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
+
+
+def strays(clip: Clip) -> list[int]:
+    """The frames among the first and the last that `scan` calls a rest pose or an outlier."""
+    if len(clip) <= 2:
+        return []
+    return [one.start for one in _strays(clip, _steps(clip, Observation.full(clip))[0])]
 
 
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
@@ -115,6 +119,16 @@ def _steps(clip: Clip, known: Observation) -> tuple[np.ndarray, np.ndarray]:
     position = known.translation[:, roots]
     moved[~(position[1:] & position[:-1])] = np.nan
     return turned, moved
+
+
+def _strays(clip: Clip, turned: np.ndarray) -> list[Finding]:
+    """Of a first and a last frame that have nothing to do with their neighbours; `turned` as in `_steps`."""
+    found = []
+    for frame, step, beside in ((0, 0, "after"), (len(clip) - 1, len(turned) - 1, "before")):
+        if kind := _outlier(clip, turned, frame, step):
+            note = f"nothing to do with the frame {beside} it"
+            found.append(Finding(kind, None, frame, frame + 1, note))
+    return found
 
 
 def _outlier(clip: Clip, turned: np.ndarray, frame: int, step: int) -> str | None:
