@@ -15,6 +15,7 @@ from interpose.models.stmi_gan import (  # noqa: E402
     Frame,
     Generator,
     StmiGanConfig,
+    curve,
     distances,
     settle,
 )
@@ -127,6 +128,26 @@ def test_a_new_network_says_what_it_knows(config):
     given = torch.where(known, x, pose)
     said = said.unflatten(1, (rows, together)).mean(dim=2)
     assert np.corrcoef(said.flatten(), given.flatten())[0, 1] > 0.85
+
+
+def test_curves_go_straight_on_and_through_the_middles_of_rows():
+    weights = curve(20, 5).values
+    frames = np.arange(100.0)
+    assert np.allclose(weights @ (5 * np.arange(20) + 2.0), frames), "a line is a line, past its ends, too"
+    assert np.allclose(weights[2::5], np.eye(20))
+
+
+def test_a_dense_network_begins_with_what_one_of_single_frames_says():
+    single, dense = Generator(PAPER).eval(), Generator(DENSE).eval()
+    dense.grow(single)
+    x, known = torch.randn(2, 20, 22, 3), torch.rand(2, 20, 22, 3) < 0.7
+    seen = known.repeat_interleave(6, dim=1)
+    seen &= torch.arange(120)[:, None, None] % 6 != 1  # a few frames of a row tell as much as all
+    with torch.no_grad():
+        said = dense.aligned(x.repeat_interleave(6, dim=1), seen, noise(dense, batch=2).float())
+        alone = single.aligned(x, known, noise(single, batch=2).float())
+    along = (curve(20, 6).beside(alone) @ alone.flatten(2)).unflatten(2, (22, 3))
+    assert torch.allclose(said, along, atol=1e-4)
 
 
 @pytest.mark.parametrize("config", [PAPER, DENSE], ids=["paper", "dense"])
