@@ -70,6 +70,16 @@ def test_short_beginnings_where_frames_are_dense():
     assert 70 < seen.max() <= 80
 
 
+def test_joints_are_lost_all_along_or_for_a_while_where_frames_are_dense():
+    for config, while_ in (("dense", 0.5), ("paper", 0.0)):
+        known = corrupt(np.random.default_rng(0), StmiGanSettings(config=config), 400)[..., 1:-1, :, :]
+        # Motions of which whole joints are lost, and others are known from one end to the other.
+        held, lost = known.all(axis=(1, 3)), ~known.all(axis=(1, 3))
+        some = held.any(axis=1) & lost.any(axis=1)
+        along = np.array([(~one[:, gone]).all() for one, gone in zip(known[some], lost[some])])
+        assert abs((~along).mean() - while_) < 0.15
+
+
 def test_twenty_frames_of_four_seconds_one_of_each_block(windows):
     settings = StmiGanSettings(config="paper", tallest=1.0)
     motions = draw(np.random.default_rng(0), windows, settings, 3)
@@ -151,9 +161,9 @@ def test_the_discriminator_may_learn_alone_at_first(windows):
     assert any(p.grad is not None and p.grad.any() for p in play.generator.parameters())
 
 
-@pytest.mark.parametrize("changes", [{"branches": "base,sound"}, {"config": "large"}])
+@pytest.mark.parametrize("changes", [{"branches": "base,sound"}, {"config": "large"}, {"lead": 1.0}])
 def test_settings_that_are_none(changes):
-    with pytest.raises(RequestError, match=r"base, edm, motion|paper"):
+    with pytest.raises(RequestError, match=r"base, edm, motion|paper|0 to 0\.9"):
         StmiGanSettings(**changes)
 
 

@@ -84,6 +84,12 @@ class StmiGanSettings(Settings):
         super().__post_init__()
         if self.config not in CONFIGS:
             raise unknown("config", self.config, CONFIGS)
+        if not 0 <= self.lead < 1:
+            raise RequestError(
+                f"the discriminator cannot learn alone for {self.lead:g} of the budget",
+                "it is a share, and the generator needs the rest",
+                "Choose 0 to 0.9.",
+            )
         if bad := [name for name in self.looks if name not in BRANCHES]:
             raise RequestError(
                 f"unknown branch: {bad[0]}",
@@ -116,7 +122,6 @@ def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> 
             motion[rng.integers(frames // 6, 2 * frames // 3) if dense else frames // 2 :] = False
             continue
         keep = rng.uniform(0.25, 0.75)
-        hole = gap_mask(rng, 1, frames, joints, frames / 4, frames / 8)[0, ..., None]
         kinds = ("frames", "joints", "limbs", "values", *(("gap",) if dense else ()))
         kind = kinds[rng.integers(len(kinds))]
         if kind == "frames":
@@ -128,10 +133,9 @@ def corrupt(rng: np.random.Generator, settings: StmiGanSettings, batch: int) -> 
                 motion[:, list(limb)] = rng.random() < keep
         elif kind == "values":
             motion[:] = rng.random(motion.shape) < keep
-        else:
-            motion[:] = hole
-        if dense and kind in ("joints", "limbs") and rng.random() < 0.5:
-            motion |= hole
+        if kind == "gap" or (dense and kind in ("joints", "limbs") and rng.random() < 0.5):
+            around = gap_mask(rng, 1, frames, joints, frames / 4, frames / 8)[0, ..., None]
+            motion[:] = around if kind == "gap" else motion | around
         motion[[0, -1]] = True
     return known
 
@@ -286,7 +290,7 @@ def train_stmi_gan(
     held_out = Windows(packs, ("validation",), 120, device).spread(96)
     generator, discriminator = (make(settings.network).to(device) for make in (Generator, Discriminator))
     fit_normaliser(generator, discriminator, windows, settings)
-    if start and settings.network.together > 1 and start.training["network"]["together"] == 1:
+    if start and settings.network.together > 1 and StmiGanConfig.of(start.training["network"]).together == 1:
         generator.grow(trained(start))
     elif start:
         restore(generator, start.onnx)
