@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,23 @@ def test_sizes():
     count = {name: sum(p.numel() for p in Base(config).parameters()) for name, config in CONFIGS.items()}
     assert 2e6 < count["small"] < 4e6
     assert 15e6 < count["base"] < 25e6
+
+
+def test_a_network_that_has_grown_says_what_the_smaller_one_does(given, model):
+    """To the last digits, with twice the units and blocks in between; then its units part."""
+    grown = Base(replace(TINY, width=48, heads=4, layers=3)).double().eval()
+    grown.grow(model)
+    small, large = (net.complete(*given) for net in (model, grown))
+    assert torch.allclose(small.motion.root, large.motion.root, atol=1e-6)
+    assert rotations.angle(small.motion.local, large.motion.local).max() < 1e-5
+    assert torch.allclose(small.risk, large.risk, atol=1e-6)
+    large.motion.root.sum().backward()
+    slope = grown.encoder.see.weight.grad
+    assert not torch.allclose(slope[:24], slope[24:])
+    assert grown.encoder.blocks[1].outer.weight.grad.any()
+    for other in (replace(TINY, width=36, heads=3), replace(TINY, width=48)):
+        with pytest.raises(RequestError, match="width 48 with 4 heads"):
+            Base(other).grow(model)
 
 
 def test_the_starting_point_goes_on_as_the_motion_does():

@@ -18,6 +18,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
 from interpose.geometry.ground import FLOOR
@@ -82,7 +83,8 @@ class BaseConfig:
 
 
 SMALL = BaseConfig()
-BASE = BaseConfig(width=512, heads=8)
+# Twice as wide, so that it can begin with what `small` says (`Base.grow`).
+BASE = BaseConfig(width=384, heads=12, layers=10)
 CONFIGS = {"small": SMALL, "base": BASE}
 
 
@@ -269,6 +271,44 @@ class Base(nn.Module):
         super().__init__()
         self.config = config
         self.encoder = Encoder(config)
+
+    def grow(self, other: Base) -> None:
+        """Begin with what a network of fewer units and blocks says, exactly (after Chen et al. 2016, Net2Net).
+
+        Each of its units is here several times, and whoever listens to it listens a little differently to
+        each, so that they part as they learn. Blocks that it does not have add nothing yet.
+        """
+        times, rest = divmod(self.config.width, other.config.width)
+        blocks, held = len(self.encoder.blocks), len(other.encoder.blocks)
+        if rest or self.config.heads != times * other.config.heads or blocks < held:
+            raise RequestError(
+                f"a network of width {self.config.width} cannot begin with one of width {other.config.width}",
+                "each of its units, and of its heads, is taken as often, and all of its blocks",
+                f"Choose a multiple, as width {2 * other.config.width} with {2 * other.config.heads} heads.",
+            )
+        old = {name: value.float() for name, value in other.state_dict().items()}
+        places = {round(i * (blocks - 1) / max(1, held - 1)): i for i in range(held)}
+        with torch.no_grad():
+            for name, value in self.state_dict().items():
+                part = name.split(".")
+                if part[1] == "blocks" and int(part[2]) not in places:
+                    if part[3] in ("say", "outer"):
+                        value.zero_()
+                    continue
+                if part[1] == "blocks":
+                    part[2] = str(places[int(part[2])])
+                began = old[".".join(part)]
+                if part[1] == "label":
+                    value.copy_(began.repeat(1, times))
+                    continue
+                if len(value) > len(began):  # what asks is three in one: queries, keys and values
+                    thirds = began.unflatten(0, (3 if part[-2] == "ask" else 1, -1))
+                    began = torch.cat([thirds] * times, dim=1).flatten(0, 1)
+                if value.shape != began.shape:
+                    share = torch.randn(times, *began.shape) / (4 * times)
+                    share += 1 / times - share.mean(dim=0)
+                    began = torch.cat([*(share * began)], dim=1)
+                value.copy_(began)
 
     def start(self, local: Tensor, root: Tensor, known: Tensor, bones: Tensor) -> Start:
         """The classical completion of what is known; arguments as in `complete`."""

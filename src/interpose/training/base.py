@@ -86,6 +86,7 @@ class BaseSettings(Settings):
     distances: int = 1
     room: int = 1
     width: int = 0  # 0 for the configuration's
+    heads: int = 0
     layers: int = 0
     # Weights of the losses.
     position: float = 10.0  # of metres, in the mean over what is missing
@@ -106,17 +107,19 @@ class BaseSettings(Settings):
 
     def network(self, labels: tuple[str, ...]) -> BaseConfig:
         base = CONFIGS[self.config]
-        if self.width % base.heads:
+        heads = self.heads or base.heads
+        if self.width % heads:
             raise RequestError(
                 f"a network cannot be {self.width} wide",
-                f"its {base.heads} heads share the width evenly",
-                f"Write --set width={base.heads * max(1, round(self.width / base.heads))}.",
+                f"its {heads} heads share the width evenly",
+                f"Write --set width={heads * max(1, round(self.width / heads))}.",
             )
         return replace(
             base,
             labels=labels,
             dropout=self.dropout,
             width=self.width or base.width,
+            heads=heads,
             layers=self.layers or base.layers,
             residual=bool(self.residual),
             velocities=bool(self.velocities),
@@ -311,12 +314,18 @@ def train_base(
     poses = Poses(kept, splits, labels, SHORTEST, device)
     # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
-    network = settings.network(labels)
-    if start:  # what it is wired like has no weights of its own that could tell
-        network = BaseConfig(**{**start.training["network"], "labels": labels, "dropout": settings.dropout})
-    model = Base(network).to(device)
+    asked = settings.network(labels)
+    # What a network is wired like has no weights of its own that could tell.
+    wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout} if start else {}
+    network = BaseConfig(**wired) if start else asked
+    model = Base(network)
     if start:
         restore(model, start.onnx)
+    if asked.width > network.width:
+        network = replace(network, width=asked.width, heads=asked.heads, layers=asked.layers)
+        smaller, model = model, Base(network)
+        model.grow(smaller)
+    model = model.to(device)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
     # No longer than the network can see with what is around them; nor, where all clips are short, as a user's
     # own may be, than fit into them.
