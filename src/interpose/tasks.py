@@ -132,7 +132,8 @@ def fill(
         margin = round(CONTEXT * clip.fps)
         lo, hi = max(0, start - margin), min(len(clip), stop + margin)
         way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if start <= f < stop}
-        window, seen = clip.slice(lo, hi), observation.slice(lo, hi)
+        # The file tells what its joints can do, and is not what the window is written to.
+        window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
         part = complete(window, seen, job.method, seed, limit=limit, path=way, first=lo)
         fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
         inside = slice(start - lo, stop - lo)

@@ -101,3 +101,15 @@ def test_what_jumps_all_over_a_gap_falls_back_by_name(case, speaking):
     assert any("filled by spline instead: the velocity jumps" in note for note in report.notes)
     assert not any("leads over" in note for note in report.notes)
     assert report.peak <= report.peak_limit
+
+
+@pytest.mark.parametrize("gap", [Gap(10, 30), Gap(10, 30, ("lradius", "lwrist", "rhand"))])
+@pytest.mark.parametrize("method", ["small", "spline"])
+def test_what_is_said_of_an_amc_clip_is_what_its_file_holds(data, tmp_path, gap, method):
+    """Its joints turn about one or two axes: a motion that they cannot do is no result."""
+    clip = formats.load(data / "cmu_02_03.amc")
+    done = tasks.fill(clip, [gap], method).clip
+    assert np.abs(done.rotation - clip.rotation)[gap.start : gap.stop].max() > 1e-3
+    assert formats.save(done, tmp_path / "filled.amc") == ()
+    back = formats.load(tmp_path / "filled.amc", skeleton=data / "cmu_02.asf")
+    assert np.abs(back.positions() - done.positions()).max() < 1e-4

@@ -20,6 +20,7 @@ from interpose.finish.path import follow, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow
+from interpose.formats import held
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods.classical import Linear, Spline
@@ -161,6 +162,7 @@ def complete(
         raw = method.complete(hidden, observation, seed)
 
     opinion, error = _opinion(raw, known, spans)
+    opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
     bounds = None if limit is None else _Bounds(limit, _peak_limit(hidden, known, limit))
@@ -194,6 +196,7 @@ def complete(
         second = _second(
             fallback, hidden, observation, [g for g in gaps if _of(spans, g) in failed], seed
         ).clip
+        second = held(second, clip.source)
         merged, own = _merge(second, hidden, known), _merge(current, hidden, known)
         for span in failed:
             _write(current, merged, span.start, (span.start, span.stop))
@@ -212,6 +215,7 @@ def complete(
             span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
     if isinstance(method, Layer) and method.pins:
         current = pins.meet(current, known, method.pins)
+    current = _merge(held(current, clip.source), hidden, known)
     for span in spans:
         span.notes += [
             f"a spline leads over frames {first + start} to {first + stop - 1}, where velocities jumped"
@@ -227,9 +231,9 @@ def complete(
         np.where(known.translation[:, columns, None], clip.translation, current.translation),
     )
     _verify(finished, clip, known)
-    held: dict[Gap, tuple[float, float]] = {}
+    slides: dict[Gap, tuple[float, float]] = {}
     for span in spans:
-        held.update(_slides(finished, known, span, gaps))
+        slides.update(_slides(finished, known, span, gaps))
     reports = [
         _report(
             finished,
@@ -241,7 +245,7 @@ def complete(
             before[gap],
             bounds,
             unheld.get(gap),
-            held.get(gap),
+            slides.get(gap),
             method.name,
             first,
         )

@@ -12,7 +12,7 @@ from interpose.clip import Clip
 from interpose.errors import FileError, RequestError
 from interpose.formats import asf_amc, bvh, npz
 
-__all__ = ["FORMATS", "Format", "load", "save"]
+__all__ = ["FORMATS", "Format", "held", "load", "save"]
 
 
 class Format(NamedTuple):
@@ -84,6 +84,14 @@ def load(
         return chosen.read(path, **options)
     except OSError as error:
         raise FileError(f"cannot read {path}", error.strerror or str(error), "Check the file.") from None
+
+
+def held(clip: Clip, source: Any) -> Clip:
+    """The clip with the rotations that a file of the format it came from can hold: joints of AMC turn about
+    fewer axes than three. `source` is that of the clip as it was read."""
+    if not isinstance(source, asf_amc.AmcSource) or source.skeleton.parents != clip.skeleton.parents:
+        return clip
+    return clip.with_motion(source.layout.held(clip.rotation, clip.skeleton.parents), clip.translation)
 
 
 def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:

@@ -273,7 +273,7 @@ class Base(nn.Module):
         self.encoder = Encoder(config)
 
     def grow(self, other: Base) -> None:
-        """Begin with what a network of fewer units and blocks says, exactly (after Chen et al. 2016, Net2Net).
+        """Begin with what a network of fewer units and blocks says, exactly (Chen et al. 2016, Net2Net).
 
         Each of its units is here several times, and whoever listens to it listens a little differently to
         each, so that they part as they learn. Blocks that it does not have add nothing yet.

@@ -105,6 +105,12 @@ class Layout:
             made[:, joint] = rotations.multiply(above, local)
         return own, np.where(turned, np.degrees(rotations.angle(made, aims)), 0.0)
 
+    def held(self, rotation: np.ndarray, parents: tuple[int, ...]) -> np.ndarray:
+        """The clip's rotations (n, J, 4) that a file holds when these are written."""
+        own, _ = self.reachable(rotation, np.ones(rotation.shape[:2], bool), parents)
+        turned = rotations.multiply(rotations.multiply(self.before, own), self.after)
+        return place.rotations_inside(turned, self.up)
+
     def moved(self, values: np.ndarray, translation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers (n, T) in the columns `moving` that give translations (n, K, 3) in metres, Y up.
 
