@@ -157,7 +157,8 @@ class Trainer:
 
     Args:
         model: what is trained.
-        loss: from a random generator and the fraction of the budget spent to a scalar loss.
+        loss: from a random generator and the fraction of the budget spent to a scalar loss; one without
+            gradients leaves the model as it is.
         validate: measures the averaged model; its figures go to the log.
         optimizer: makes the optimiser from the parameters; Adam without one.
         clip: the largest norm of the gradients.
@@ -262,7 +263,7 @@ class Trainer:
         if not dist.is_initialized():
             return None
         gradients = [p.grad for p in model.parameters() if p.grad is not None]
-        spent = gradients[0].new_tensor([self.budget.clock()])
+        spent = torch.tensor([self.budget.clock()], device=self.device)
         flat = torch.cat([spent, *(g.flatten() for g in gradients)])
         dist.all_reduce(flat)
         for gradient, total in zip(gradients, flat[1:].split([g.numel() for g in gradients])):
@@ -319,7 +320,10 @@ class Trainer:
                 one.optimizer.step()
             loss = self.loss(self.rng, self.budget.fraction)
             self.optimizer.zero_grad(set_to_none=True)
-            loss.backward()
+            # A loss of nothing is no step of size 0: an optimiser that has seen such ones for long takes the
+            # first real gradients for far larger than usual.
+            if loss.requires_grad:
+                loss.backward()
             self.budget.step(self._share(self.model))
             if self.clip is not None:
                 nn.utils.clip_grad_norm_(self.model.parameters(), self.clip)

@@ -218,7 +218,7 @@ class Game:
         """Of the generator (equations 1, 2, 3 and 5); nothing while the discriminator learns alone."""
         asked = self.settings
         if asked.looks and fraction < asked.lead:
-            return 0.0 * next(self.generator.parameters()).sum()
+            return torch.zeros((), device=self.generator.std.device)
         motions = self.motions if asked.looks and self.motions else self.play(rng)
         loss = self.told(motions)
         if asked.looks:
