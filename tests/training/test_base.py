@@ -428,3 +428,20 @@ def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path):
         False,
         False,
     )
+
+
+def test_a_run_for_a_wider_network_begins_with_the_one_it_starts_from(walk_pack, tmp_path):
+    pack = walk_pack("lafan1", both=True)
+    first = BaseSettings(width=24, layers=1, batch=2, longest=40, near=0, every_seconds=1e9)
+    train_base([pack], tmp_path / "first", Budget.parse("1steps"), first)
+    export_base(tmp_path / "first", [pack], tmp_path / "weights", ["train"])
+    card = weights.load(tmp_path / "weights", "small")
+    wider = replace(first, width=48, heads=12, layers=2, near=1, learning_rate=1e-9)
+    train_base([pack], tmp_path / "second", Budget.parse("1steps"), wider, start=card)
+    settings = json.loads((tmp_path / "second" / "settings.json").read_text())
+    assert [settings["network"][name] for name in ("width", "heads", "layers", "near")] == [48, 12, 2, False]
+    before, after = (
+        json.loads((tmp_path / name / "log.jsonl").read_text().splitlines()[-1])["gap15"]
+        for name in ("first", "second")
+    )
+    assert after == pytest.approx(before, rel=1e-3)

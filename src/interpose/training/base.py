@@ -321,7 +321,9 @@ def train_base(
     model = Base(network)
     if start:
         restore(model, start.onnx)
-    if asked.width > network.width:
+    # Larger than they were only where that is asked for: by name, or by its width.
+    larger = start and (settings.width or settings.config != start.training["config"])
+    if larger and asked.width > network.width:
         network = replace(network, width=asked.width, heads=asked.heads, layers=asked.layers)
         smaller, model = model, Base(network)
         model.grow(smaller)

@@ -7,6 +7,7 @@ import json
 import logging
 import os
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -280,20 +281,85 @@ def _halve(model: onnx.ModelProto) -> None:
         model.graph.node.insert(0, cast)
 
 
+@dataclass
+class _Run:
+    """A run that has ended.
+
+    Attributes:
+        folder: where it lies.
+        settings: its own.
+        log: after that of the weights that it started from.
+        earlier: what their card said of their training.
+        auto: what `auto` goes by. It stays as measured on the weights that the run started from: a run that
+            goes on may train on the performers that it was measured with. Of a first run it is not measured
+            yet, so that all gaps are the spline's until `interpose bench threshold --save`.
+    """
+
+    folder: Path
+    settings: dict[str, Any]
+    log: list[dict[str, Any]]
+    earlier: list[dict[str, Any]]
+    auto: dict[str, Any]
+
+    @classmethod
+    def of(cls, folder: Path) -> _Run:
+        """Read it."""
+
+        def lines(name: str) -> list[dict[str, Any]]:
+            return [json.loads(line) for line in (folder / name).read_text().splitlines()]
+
+        settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+        if not (folder / "earlier.json").exists():
+            return cls(folder, settings, lines("log.jsonl"), [], {"from_gap": 61})
+        before = lines("earlier.jsonl")
+        steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
+        after = [
+            {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
+            for entry in lines("log.jsonl")
+        ]
+        kept = json.loads((folder / "earlier.json").read_text())
+        return cls(folder, settings, before + after, kept["training"], kept["auto"])
+
+    def begin(self, out: Path, name: str, model: torch.nn.Module) -> Path:
+        """Fill a model with the averaged weights, write the log, and say where the graph `name` goes.
+
+        One folder holds one network, as its log and its curves have no name: RequestError otherwise.
+        """
+        if others := [path for path in out.glob("*.onnx") if path.stem != name]:
+            raise RequestError(
+                f"cannot write {name}.onnx into {out}", f"{others[0].name} is in there", "Write --out FOLDER."
+            )
+        held = torch.load(self.folder / "averaged.pt", map_location="cpu", weights_only=True)
+        model.load_state_dict(held)
+        out.mkdir(parents=True, exist_ok=True)
+        (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in self.log))
+        return out / f"{name}.onnx"
+
+    def training(self, recipe: str, splits: list[str], model: torch.nn.Module) -> dict[str, Any]:
+        """How the weights came to be, for the card."""
+        return {
+            "recipe": f"interpose train {recipe}"
+            + (", going on from what `earlier` tells of" if self.earlier else ""),
+            **self.settings,
+            "splits": splits,
+            "steps": self.log[-1]["step"],
+            "device_hours": self.log[-1]["hours"],  # from the first start on, as the steps
+            "earlier": self.earlier,
+            "parameters": sum(p.numel() for p in model.parameters()),
+            "date": datetime.date.today().isoformat(),
+        }
+
+
 def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder.
 
     A run of one of the networks to compare with is called after that network instead.
     """
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    run = _Run.of(folder)
+    settings, log = run.settings, run.log
     name = settings.get("network", "cae")
-    _check_free(out, name)
     model = NETWORKS[name]()
-    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
-    out.mkdir(parents=True, exist_ok=True)
-    export_onnx(model, out / f"{name}.onnx")
-    log, earlier, auto = _history(folder)
-    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    export_onnx(model, run.begin(out, name, model))
     _curves(log, name, f"{settings.get('loss', 'l1').upper()}, normalised", (15, 30, 60), out)
     longest = settings.get("gap") or 60
     card = Card(
@@ -309,14 +375,14 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         # validation performers, whom its last runs had seen, are off by 22, not 39 cm (bench context).
         max_gap=2 * longest,
         training={
-            **_training("cae", settings, splits, log, earlier, model),
+            **run.training("cae", splits, model),
             "statistics": {
                 "mean": [round(float(v), 6) for v in model.mean.flatten()],
                 "std": [round(float(v), 6) for v in model.std.flatten()],
             },
         },
         metrics={"validation": log[-1]},
-        auto=auto,
+        auto=run.auto,
     )
     card.save(out / f"{name}.json")
     return card
@@ -324,15 +390,11 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
 
 def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `seq2seq.onnx`, `seq2seq.json`, the log and its curves into `out` from a run's folder."""
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    run = _Run.of(folder)
+    settings, log = run.settings, run.log
     config = settings.pop("config")
-    _check_free(out, "seq2seq")
     model = Seq2Seq(Seq2SeqConfig(**{**config, "labels": tuple(config["labels"])}))
-    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
-    out.mkdir(parents=True, exist_ok=True)
-    export_seq2seq_onnx(model, out / "seq2seq.onnx")
-    log, earlier, _ = _history(folder)
-    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    export_seq2seq_onnx(model, run.begin(out, "seq2seq", model))
     hours = [entry["hours"] for entry in log]
     curve = {"loss": (hours, [entry["loss"] for entry in log])}
     line_plot(curve, "device hours", "squared, normalised", "Training of seq2seq", path=out / "loss.svg")
@@ -352,7 +414,7 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
         joints=list(JOINTS),
         fps=30.0,
         max_gap=0,
-        training=_training("seq2seq", settings, splits, log, earlier, model),
+        training=run.training("seq2seq", splits, model),
         metrics={"validation": log[-1]},
         labels=config["labels"],
     )
@@ -360,25 +422,13 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
     return card
 
 
-def _check_free(out: Path, name: str) -> None:
-    """One folder holds one network: its log and its curves have no name. RequestError otherwise."""
-    if others := [path for path in out.glob("*.onnx") if path.stem != name]:
-        raise RequestError(
-            f"cannot write {name}.onnx into {out}", f"{others[0].name} is in there", "Write --out FOLDER."
-        )
-
-
 def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `cmib.onnx`, `cmib.json`, the training log and its curves into `out` from a run's folder."""
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    run = _Run.of(folder)
+    settings, log = run.settings, run.log
     config = settings.pop("config")
-    _check_free(out, "cmib")
     model = Cmib(CmibConfig(**{**config, "labels": tuple(config["labels"])}))
-    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
-    out.mkdir(parents=True, exist_ok=True)
-    export_cmib_onnx(model, out / "cmib.onnx")
-    log, earlier, _ = _history(folder)
-    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    export_cmib_onnx(model, run.begin(out, "cmib", model))
     _curves(log, "cmib", "weighted loss", (30, 60, 120), out)
     labels = config.pop("labels")
     card = Card(
@@ -391,7 +441,7 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         joints=list(JOINTS),
         fps=30.0,
         max_gap=settings["longest"] - 2,  # a length counts both keys
-        training={**_training("cmib", settings, splits, log, earlier, model), "config": config},
+        training={**run.training("cmib", splits, model), "config": config},
         metrics={"validation": log[-1]},
         labels=labels,
         paces=paces(packs, splits),
@@ -402,15 +452,11 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
 
 def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder."""
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    run = _Run.of(folder)
+    settings, log = run.settings, run.log
     config = StmiGanConfig.of(settings["network"])
-    _check_free(out, "stmi-gan")
     model = Generator(config)
-    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
-    out.mkdir(parents=True, exist_ok=True)
-    export_stmi_gan_onnx(model, out / "stmi-gan.onnx")
-    log, earlier, _ = _history(folder)
-    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    export_stmi_gan_onnx(model, run.begin(out, "stmi-gan", model))
     hours = [entry["hours"] for entry in log]
     curve = {"generator": (hours, [entry["loss"] for entry in log])}
     line_plot(curve, "device hours", "weighted loss", "Training of stmi-gan", path=out / "loss.svg")
@@ -430,7 +476,7 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         joints=list(JOINTS),
         fps=config.fps,
         max_gap=config.frames // 2,
-        training=_training("stmi-gan", settings, splits, log, earlier, model),
+        training=run.training("stmi-gan", splits, model),
         metrics={"validation": log[-1]},
     )
     card.save(out / "stmi-gan.json")
@@ -444,16 +490,12 @@ def export_base(
 
     licence: what the weights may be used for, where the packs do not decide.
     """
-    settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+    run = _Run.of(folder)
+    settings, log = run.settings, run.log
     network = settings.pop("network")
     name, labels = title(settings["config"], settings["datasets"]), network["labels"]
-    _check_free(out, name)
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
-    model.load_state_dict(torch.load(folder / "averaged.pt", map_location="cpu", weights_only=True))
-    out.mkdir(parents=True, exist_ok=True)
-    export_base_onnx(model, out / f"{name}.onnx")
-    log, earlier, auto = _history(folder)
-    (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in log))
+    export_base_onnx(model, run.begin(out, name, model))
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
     packs = chosen(packs, settings["datasets"])
@@ -467,9 +509,9 @@ def export_base(
         joints=list(JOINTS),
         fps=30.0,
         max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
-        training={**_training("base", settings, splits, log, earlier, model), "network": network},
+        training={**run.training("base", splits, model), "network": network},
         metrics={"validation": log[-1]},
-        auto=auto,
+        auto=run.auto,
         labels=labels,
     )
     card.save(out / f"{name}.json")
@@ -506,27 +548,6 @@ def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
     return sorted(data, key=lambda one: [*DATASETS, OWN].index(one["name"]))
 
 
-def _training(
-    name: str,
-    settings: dict[str, Any],
-    splits: list[str],
-    log: list[dict[str, Any]],
-    earlier: list[dict[str, Any]],
-    model: torch.nn.Module,
-) -> dict[str, Any]:
-    """How the weights came to be, for the card."""
-    return {
-        "recipe": f"interpose train {name}" + (", going on from what `earlier` tells of" if earlier else ""),
-        **settings,
-        "splits": splits,
-        "steps": log[-1]["step"],
-        "device_hours": log[-1]["hours"],  # from the first start on, as the steps
-        "earlier": earlier,
-        "parameters": sum(p.numel() for p in model.parameters()),
-        "date": datetime.date.today().isoformat(),
-    }
-
-
 def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ...], out: Path) -> None:
     """Draw the loss, and the errors on validation performers, over device hours."""
     hours = [entry["hours"] for entry in log]
@@ -538,27 +559,3 @@ def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ..
         if f"gap{gap}" in log[-1]
     }
     line_plot(errors, "device hours", "joint error, cm", "Validation performers", path=out / "validation.svg")
-
-
-def _history(folder: Path) -> tuple[list[dict[str, Any]], list[dict[str, Any]], dict[str, Any]]:
-    """The log of a run, after that of the weights that it started from; what their card said of their
-    training; and what `auto` goes by.
-
-    The latter stays as measured on them: a run that goes on may train on the performers that it was measured
-    with. Of a first run it is not measured yet, so that all gaps are the spline's until
-    `interpose bench threshold --save`.
-    """
-
-    def lines(name: str) -> list[dict[str, Any]]:
-        return [json.loads(line) for line in (folder / name).read_text().splitlines()]
-
-    if not (folder / "earlier.json").exists():
-        return lines("log.jsonl"), [], {"from_gap": 61}
-    before = lines("earlier.jsonl")
-    steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
-    after = [
-        {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
-        for entry in lines("log.jsonl")
-    ]
-    kept = json.loads((folder / "earlier.json").read_text())
-    return before + after, kept["training"], kept["auto"]
