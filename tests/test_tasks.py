@@ -85,6 +85,26 @@ def test_gaps_do_not_depend_on_each_other_s_filling(long_walk):
     assert _same(together, first, slice(300, 330))
 
 
+def test_near_gaps_are_completed_at_once(cmu_walk, monkeypatch):
+    """Else each would complete all of its neighbours once more: keys on fives take 20 times as long."""
+    asked, real = [], tasks.complete
+
+    def counted(*args, **options):  # type: ignore[no-untyped-def]
+        asked.append(real(*args, **options))
+        return asked[-1]
+
+    monkeypatch.setattr(tasks, "complete", counted)
+    gaps = [Gap(frame + 1, frame + 5) for frame in range(0, 200, 5)]
+    done = tasks.fill(cmu_walk, gaps, "linear", methods={7: "spline"})
+    assert sum(len(one.report.gaps) for one in asked) < 3 * len(gaps)
+    assert [(gap.number, gap.start, gap.stop) for gap in done.report.gaps] == [
+        (number, gap.start, gap.stop) for number, gap in enumerate(gaps, 1)
+    ]
+    assert done.report.gaps[6].method == "spline"
+    alone = tasks.fill(cmu_walk, gaps, "linear", only=[20])
+    assert _same(alone.clip, done.clip, slice(gaps[19].start, gaps[19].stop))
+
+
 def test_only_and_max_gap_leave_gaps_open(cmu_walk):
     gaps = [Gap(20, 30), Gap(60, 100), Gap(120, 130)]
     done = tasks.fill(cmu_walk, gaps, "linear", max_gap=20)

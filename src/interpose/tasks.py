@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from interpose.skeletons import find_humanoid
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
+GROUP = 8.0  # seconds: gaps near each other are completed at once up to this length
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
@@ -126,25 +127,28 @@ def fill(
     said: list[tuple[int, slice, Raw]] = []
     reports: list[GapReport] = []
     limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
-    work = [(job, piece) for job in jobs if job.method for piece in _pieces(clip, observation, job.gap)]
-    for done, (job, (start, stop)) in enumerate(work):
-        assert job.method is not None
+    work = [(group, one) for group in _together(jobs, clip, observation) for one in group.methods]
+    for done, (group, chosen) in enumerate(work):
         margin = round(CONTEXT * clip.fps)
-        lo, hi = max(0, start - margin), min(len(clip), stop + margin)
-        way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if start <= f < stop}
+        lo, hi = max(0, group.pieces[0].start - margin), min(len(clip), group.pieces[-1].stop + margin)
+        pieces = [piece for piece in group.pieces if piece.job.method == chosen]
+        led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
+        way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if f in led}
         # The file tells what its joints can do, and is not what the window is written to.
         window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
-        part = complete(window, seen, job.method, seed, limit=limit, path=way, first=lo)
-        fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
-        inside = slice(start - lo, stop - lo)
-        _paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
-        known = observation.translation[:, list(clip.translated)]
-        _paste(translation, part.clip.translation, known, start, inside, fade)
-        provenance[start:stop] = part.provenance[inside]
-        said.append((start, inside, part.raw))
-        reports += _shifted(part.report.gaps, lo, start, stop, job)
+        part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo)
+        for job, start, stop in pieces:
+            fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
+            inside = slice(start - lo, stop - lo)
+            _paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
+            known = observation.translation[:, list(clip.translated)]
+            _paste(translation, part.clip.translation, known, start, inside, fade)
+            provenance[start:stop] = part.provenance[inside]
+            said.append((start, inside, part.raw))
+            reports += _shifted(part.report.gaps, lo, start, stop, job)
         if progress:
             progress((done + 1) / len(work))
+    reports.sort(key=lambda gap: (gap.number, gap.start))
     reports = _joined(reports)
     left = [job.gap for job in jobs if job.method is None]
     report = Report(method, reports, left, action)
@@ -567,6 +571,46 @@ def _lead(observation: Observation, gap: Gap) -> Gap:
     empty = runs(np.logical_not(observation.rotation[gap.start : gap.stop].any(axis=1)))
     start, stop = max(empty, key=lambda run: run[1] - run[0])
     return Gap(gap.start + start, gap.start + stop)
+
+
+class _Piece(NamedTuple):
+    """The frames of a job that are completed at once: all, or those of a piece of a long one."""
+
+    job: Job
+    start: int
+    stop: int
+
+
+@dataclass
+class _Group:
+    """Pieces near each other, which are seen and completed at once."""
+
+    pieces: list[_Piece]
+
+    @property
+    def methods(self) -> list[Method]:
+        """Those that fill any of it."""
+        found: list[Method] = []
+        for piece in self.pieces:
+            if piece.job.method is not None and piece.job.method not in found:
+                found.append(piece.job.method)
+        return found
+
+
+def _together(jobs: Sequence[Job], clip: Clip, observation: Observation) -> list[_Group]:
+    """All jobs in groups. What is near belongs together, filled or left open and by whatever method: each gap
+    is seen with what is around it, so alone it would have its neighbours completed once more, and what
+    becomes of it does not depend on what becomes of them."""
+    groups: list[_Group] = []
+    for job in jobs:
+        for start, stop in _pieces(clip, observation, job.gap):
+            held = groups[-1].pieces if groups else []
+            near = held and held[-1].job is not job and start - held[-1].stop < CONTEXT * clip.fps
+            if near and stop - held[0].start <= GROUP * clip.fps:
+                held.append(_Piece(job, start, stop))
+            else:
+                groups.append(_Group([_Piece(job, start, stop)]))
+    return groups
 
 
 def _pieces(clip: Clip, observation: Observation, gap: Gap) -> Iterator[tuple[int, int]]:

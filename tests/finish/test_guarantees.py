@@ -216,6 +216,35 @@ def test_the_rest_pose_is_no_better_than_motion_that_jumps(walk):
         assert "the velocity jumps" in " ".join(gap.notes)
 
 
+class Kicking(Linear):
+    """The right leg turns by two radians from frame 105 on."""
+
+    name = "kicking"
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        raw = super().complete(clip, observation, seed)
+        leg, rotation = clip.skeleton.index("RightUpLeg"), raw.clip.rotation.copy()
+        rotation[105:, leg] = rotations.multiply(rotation[105:, leg], rotations.about("X", np.array(2.0)))
+        return Raw(raw.clip.with_motion(rotation, raw.clip.translation))
+
+
+def test_a_jump_is_told_of_the_gap_that_it_is_in(walk):
+    """An arm that is lost before it, and for a while together with the leg, has nothing to do with it."""
+    known = Observation.from_gaps(walk, [Gap(60, 90, ("LeftArm",)), Gap(80, 120, ("RightUpLeg",))])
+    gaps = complete(walk, known, Kicking()).report.gaps
+    assert [(gap.start, gap.stop) for gap in gaps] == [(60, 80), (80, 90), (90, 120)]
+    assert [any("velocities jumped" in note for note in gap.notes) for gap in gaps] == [False, False, True]
+
+
+def test_what_is_missing_all_the_while_has_no_seam(walk):
+    """At frame 90 the arm is known again; the leg is not, and its jump there is none of the arm's."""
+    known = Observation.from_gaps(walk, [Gap(60, 90, ("LeftArm",)), Gap(80, 120, ("RightUpLeg",))])
+    at, names = np.array([90]), walk.skeleton.names
+    every, own = (np.linalg.norm(of(walk, known, at), axis=-1)[0] for of in (seams.jumps, seams.seam_jumps))
+    assert every[names.index("RightFoot")] > 0 == own[names.index("RightFoot")]
+    assert every[names.index("LeftHand")] == own[names.index("LeftHand")] > 0
+
+
 def test_an_observation_of_another_clip_is_refused(walk):
     with pytest.raises(RequestError, match="does not fit"):
         complete(walk, gaps_of(walk.slice(0, 60), (10, 20)), Linear())

@@ -103,6 +103,24 @@ def test_what_jumps_all_over_a_gap_falls_back_by_name(case, speaking):
     assert report.peak <= report.peak_limit
 
 
+def test_what_is_lost_while_something_else_is_lost_has_a_seam_of_its_own(cmu_walk):
+    """A leg that steps while an arm comes back is no jump of the arm's."""
+    known, names = Observation.from_gaps(cmu_walk, []), cmu_walk.skeleton.names
+    for frames, part in ((slice(60, 110), "LeftArm"), (slice(85, 140), "RightUpLeg")):
+        whole = {names.index(part)}
+        for joint, parent in enumerate(cmu_walk.skeleton.parents):
+            whole |= {joint} if parent in whole else set()
+        known.rotation[frames, sorted(whole)] = False
+    lost = ~known.positions(cmu_walk.skeleton)
+    done = {method: tasks.fill(cmu_walk, known, method) for method in ("small", "spline")}
+    off = {
+        method: np.linalg.norm(one.clip.positions() - cmu_walk.positions(), axis=-1)[lost].mean()
+        for method, one in done.items()
+    }
+    assert [gap.method for gap in done["small"].report.gaps] == ["small"] * 3
+    assert off["small"] < 0.9 * off["spline"]
+
+
 @pytest.mark.parametrize("gap", [Gap(10, 30), Gap(10, 30, ("lradius", "lwrist", "rhand"))])
 @pytest.mark.parametrize("method", ["small", "spline"])
 def test_what_is_said_of_an_amc_clip_is_what_its_file_holds(data, tmp_path, gap, method):

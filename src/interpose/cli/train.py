@@ -198,6 +198,7 @@ def base(*, run: Run) -> None:
     Try:
       interpose train base --packs packs --out runs/small --budget 2h
       interpose train base --out runs/base --set config=base
+      interpose train base --out runs/base --start small --set config=base   (begins with what it says)
       interpose train base --out runs/lafan1 --set datasets=lafan1 --set tasks=gap
       interpose train base --out runs/open --set datasets=cmu   (for any use)
       interpose train base --out runs/lines --set velocities=0   (a trial)

@@ -6,7 +6,7 @@ Precedence when they collide: observed values, then bones, then pins, then seams
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -57,7 +57,10 @@ SETS_OFF = 20.0
 MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
 # Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
 # beyond which they are not: that is a jump in value.
-ROUNDS, KINK = 6, 8.0
+ROUNDS, KINK = 12, 8.0
+# A simpler method takes over where it pops by less than this share of what the method does: the hand of a body
+# that falls jumps with either.
+LESS = 0.9
 
 
 @dataclass
@@ -65,6 +68,7 @@ class _Span:
     """A range of frames in which something is missing, and what becomes of it.
 
     `problem` says why the method's own motion does not do; it is `hopeless` if it should not be used at all.
+    Each of the notes speaks of some frames, first to last.
     """
 
     start: int
@@ -72,7 +76,11 @@ class _Span:
     method: str
     problem: str | None = None
     hopeless: bool = False
-    notes: list[str] = field(default_factory=list)
+    notes: list[tuple[int, int, str]] = field(default_factory=list)
+
+    def told(self, gap: Gap) -> list[str]:
+        """What the notes say of one of its gaps, the known frames beside it included."""
+        return [text for first, last, text in self.notes if first <= gap.stop and last >= gap.start - 1]
 
     def around(self, frames: int, margin: int) -> tuple[int, int, tuple[int, int]]:
         """The frames lo to hi - 1 around it, and its own range counted from lo."""
@@ -166,7 +174,7 @@ def complete(
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
     bounds = None if limit is None else _Bounds(limit, _peak_limit(hidden, known, limit))
-    before = {gap: _jump(current, known, _at(gap)) for gap in gaps}
+    before = {gap: _jump(current, known, _at(gap), seams.seam_jumps) for gap in gaps}
     unheld: dict[Gap, tuple[float, float]] = {}
     mended: dict[int, list[tuple[int, int]]] = {}
 
@@ -190,7 +198,8 @@ def complete(
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
-        span.problem = span.problem or _pop(current, known, span, bounds)
+        excess, above, _ = _excess(current, known, span, bounds, first)
+        span.problem = span.problem or (above if excess > 1 else None)
     failed = [s for s in spans if s.problem and (s.hopeless or fallback.name != method.name)]
     if failed:
         second = _second(
@@ -202,28 +211,29 @@ def complete(
             _write(current, merged, span.start, (span.start, span.stop))
         settle(failed, second)
         for span in failed:
-            # Where the simpler method pops no less, there is no reason to lose the motion; nor where it has
-            # only the rest pose to say.
-            excess, other = (_excess(clip, known, span, bounds)[0] for clip in (own, current))
+            # Where the simpler method pops hardly less, there is no reason to lose the motion; nor where it
+            # has only the rest pose to say.
+            excess, other = (_excess(clip, known, span, bounds, first)[0] for clip in (own, current))
             blank = isinstance(fallback, Spline) and any(
                 _never(known, gap, clip.skeleton.names) for gap in gaps if _of(spans, gap) is span
             )
-            if not span.hopeless and (blank or other > max(1.0, excess)):
+            if not span.hopeless and (blank or other > max(1.0, LESS * excess)):
                 _write(current, own, span.start, (span.start, span.stop))
                 continue
             span.method = fallback.name
-            span.notes.append(f"filled by {fallback.name} instead: {span.problem}")
+            span.notes.append(
+                (span.start, span.stop - 1, f"filled by {fallback.name} instead: {span.problem}")
+            )
     if isinstance(method, Layer) and method.pins:
         current = pins.meet(current, known, method.pins)
     current = _merge(held(current, clip.source), hidden, known)
     for span in spans:
-        span.notes += [
-            f"a spline leads over frames {first + start} to {first + stop - 1}, where velocities jumped"
-            for start, stop in mended.get(span.start, ())
-            if span.method == method.name
-        ]
-        if above := _pop(current, known, span, bounds):
-            span.notes.append(f"flagged: {above}")
+        for start, stop in mended.get(span.start, ()) if span.method == method.name else ():
+            which = f"frames {first + start} to {first + stop - 1}"
+            span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
+        excess, above, where = _excess(current, known, span, bounds, first)
+        if excess > 1:
+            span.notes.append((where, where, f"flagged: {above}"))
 
     columns = list(clip.translated)
     finished = clip.with_motion(
@@ -459,12 +469,17 @@ def _merge(opinion: Clip, hidden: Clip, known: Observation) -> Clip:
     )
 
 
-def _jump(clip: Clip, known: Observation, frames: np.ndarray) -> float | None:
-    """The largest velocity jump at seam frames, in metres per frame squared; None where there are none."""
+def _jump(
+    clip: Clip,
+    known: Observation,
+    frames: np.ndarray,
+    jumps: Callable[[Clip, Observation, np.ndarray], np.ndarray] = seams.jumps,
+) -> float | None:
+    """The largest velocity jump at some frames, in metres per frame squared; None where there are none."""
     frames = frames[(frames > 0) & (frames < len(clip) - 1)]
     if frames.size == 0:
         return None
-    return float(np.linalg.norm(seams.jumps(clip, known, frames), axis=-1).max())
+    return float(np.linalg.norm(jumps(clip, known, frames), axis=-1).max())
 
 
 def _at(gap: Gap) -> np.ndarray:
@@ -473,7 +488,8 @@ def _at(gap: Gap) -> np.ndarray:
 
 def _seams(current: Clip, known: Observation, span: _Span) -> float | None:
     """The largest velocity jump at the seams of a span."""
-    return _jump(current, known, seams.edges(known, current.translated, (span.start, span.stop)))
+    edges = seams.edges(known, current.translated, (span.start, span.stop))
+    return _jump(current, known, edges, seams.seam_jumps)
 
 
 def _write(current: Clip, source: Clip, at: int, inner: tuple[int, int]) -> None:
@@ -504,23 +520,27 @@ def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
     return max(seams.PEAKS * limit, peak, SETS_OFF / hidden.fps**2)
 
 
-def _excess(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> tuple[float, str]:
-    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not),
-    and in words."""
+def _excess(
+    current: Clip, known: Observation, span: _Span, bounds: _Bounds | None, first: int
+) -> tuple[float, str, int]:
+    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
+    words, and at which frame; words call the first frame `first`."""
     if bounds is None:
-        return 0.0, ""
-    seam = _seams(current, known, span) or 0.0
-    peak = _jump(current, known, np.arange(span.start, span.stop)) or 0.0
-    return max(
-        (jump / most, f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}")
-        for jump, most, where in ((seam, bounds.seam, "at a seam"), (peak, bounds.peak, "inside the gap"))
-    )
-
-
-def _pop(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> str | None:
-    """What is wrong with the motion at the seams of a span and inside, if anything."""
-    excess, words = _excess(current, known, span, bounds)
-    return words if excess > 1 else None
+        return 0.0, "", span.start
+    found, names = [(0.0, "", span.start)], current.skeleton.names
+    edges = seams.edges(known, current.translated, (span.start, span.stop))
+    inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
+    for frames, jumps, most, where in (
+        (edges, seams.seam_jumps, bounds.seam, "at a seam"),
+        (inside, seams.jumps, bounds.peak, "inside the gap"),
+    ):
+        if frames.size:
+            size = np.linalg.norm(jumps(current, known, frames), axis=-1)
+            row, joint = np.unravel_index(size.argmax(), size.shape)
+            jump, frame = float(size[row, joint]), int(frames[row])
+            words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}"
+            found.append((jump / most, f"{words} ({names[joint]}, frame {first + frame})", frame))
+    return max(found)
 
 
 def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _Span) -> None:
@@ -665,7 +685,7 @@ def _report(
     skeleton = finished.skeleton
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
-    after = _jump(finished, known, _at(gap))
+    after = _jump(finished, known, _at(gap), seams.seam_jumps)
     alive = None if gap.joints is not None else _liveliness(finished, gap)
     networks = gap.joints is None and "model" in raw.notes
     scant = _scant(known, gap, finished.fps) if networks else None
@@ -697,7 +717,7 @@ def _report(
         drift=_centi(_drift(raw.notes, gap)) if own else None,
         expected=_centi(float(np.mean(risk))) if risk is not None else None,
         notes=(
-            *span.notes,
+            *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),
             *_sunk(finished, known, gap, first),
             *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),

@@ -145,6 +145,19 @@ def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     return np.where((first & second & third)[..., None], 0.0, where[0] - 2 * where[1] + where[2])
 
 
+def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
+    """As `jumps`, of the joints alone that hang from a value that is known there and missing beside it: what
+    another one does that is missing all the while, as a foot that lands, is no seam of theirs."""
+    columns = list(motion.translated)
+    ends = [now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation)]
+    turned, moved = ends[0], np.zeros_like(ends[1])
+    moved[:, columns] = ends[1][:, columns]
+    for joint, parent in enumerate(motion.skeleton.parents):
+        if parent >= 0:
+            moved[:, joint] |= moved[:, parent] | turned[:, parent]
+    return np.where(moved[..., None], jumps(motion, known, at), 0.0)
+
+
 def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
     """Bring velocity jumps at the seams of the span below the limit (metres per frame squared).
 
@@ -152,7 +165,7 @@ def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float
     they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
     """
     at = edges(known, motion.translated, span)
-    jump = jumps(motion, known, at)
+    jump = seam_jumps(motion, known, at)
     size = np.linalg.norm(jump, axis=-1, keepdims=True)
     excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
     # Joints far below the limit may give way for those above it.
