@@ -54,17 +54,21 @@ def _gap(window: Window, length: int, before: int, after: int, keys: Sequence[in
     return Hidden((first, last), seen, np.repeat(~seen.frames[:, None], len(JOINTS), axis=1))
 
 
-def _joints(window: Window, lost: Sequence[int]) -> Hidden:
-    """Canonical joints whose rotations are unknown all along; what hangs from them is measured."""
-    mapping = window.body.mapping
-    names = [window.clip.skeleton.names[joint] for row in lost if (joint := mapping.joints[row]) is not None]
-    seen = Observation.from_gaps(window.clip, [Gap(0, FRAMES, tuple(names))] if names else [])
-    below = set(lost)
-    for joint, parent in enumerate(PARENTS):
-        if parent in below:
-            below.add(joint)
-    moved = np.array([PARENTS[joint] in below for joint in range(len(JOINTS))])
-    return Hidden((0, FRAMES), seen, np.broadcast_to(moved, (FRAMES, len(JOINTS))))
+def _joints(window: Window, *losses: tuple[Sequence[int], int, int]) -> Hidden:
+    """Canonical joints whose rotations are unknown from one frame to before another; what hangs from them is
+    measured."""
+    mapping, gaps, moved = window.body.mapping, [], np.zeros((FRAMES, len(JOINTS)), bool)
+    for lost, start, stop in losses:
+        names = [
+            window.clip.skeleton.names[joint] for row in lost if (joint := mapping.joints[row]) is not None
+        ]
+        gaps += [Gap(start, stop, tuple(names))] if names else []
+        below = set(lost)
+        for joint, parent in enumerate(PARENTS):
+            if parent in below:
+                below.add(joint)
+        moved[start:stop] |= np.array([PARENTS[joint] in below for joint in range(len(JOINTS))])
+    return Hidden((0, FRAMES), Observation.from_gaps(window.clip, gaps), moved)
 
 
 def _draw(rng: np.random.Generator, count: int) -> list[int]:
@@ -83,11 +87,15 @@ TASKS: dict[str, Callable[[Window, np.random.Generator], Hidden]] = {
     "1 s, five before, one after": lambda w, rng: _gap(w, 30, 5, 1),
     "1 s, ten before, one after": lambda w, rng: _gap(w, 30, 10, 1),
     "2 s between keys, one in the middle": lambda w, rng: _gap(w, 60, 1, 1, [30]),
-    "one joint lost": lambda w, rng: _joints(w, _draw(rng, 1)),
-    "three joints lost": lambda w, rng: _joints(w, _draw(rng, 3)),
-    "an arm or a leg lost": lambda w, rng: _joints(w, LIMBS[rng.integers(len(LIMBS))]),
-    "legs from the upper body": lambda w, rng: _joints(w, LEGS),
+    "one joint lost": lambda w, rng: _joints(w, (_draw(rng, 1), 0, FRAMES)),
+    "three joints lost": lambda w, rng: _joints(w, (_draw(rng, 3), 0, FRAMES)),
+    "an arm or a leg lost": lambda w, rng: _joints(w, (LIMBS[rng.integers(len(LIMBS))], 0, FRAMES)),
+    "legs from the upper body": lambda w, rng: _joints(w, (LEGS, 0, FRAMES)),
     "forecast of 1 s": lambda w, rng: _gap(w, 30, ALL, 0),
+    # Each before the one ahead is back.
+    "arms and legs lost in turn, 1 s each": lambda w, rng: _joints(
+        w, *((limb, 15 + 20 * i, 45 + 20 * i) for i, limb in enumerate(LIMBS))
+    ),
 }
 
 

@@ -58,8 +58,8 @@ MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
 # Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
 # beyond which they are not: that is a jump in value.
 ROUNDS, KINK = 12, 8.0
-# A simpler method takes over where it pops by less than this share of what the method does: the hand of a body
-# that falls jumps with either.
+# A simpler method takes over where it pops by less than this share of what the method does: the hand of a
+# body that falls jumps with either.
 LESS = 0.9
 
 
