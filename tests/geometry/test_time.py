@@ -184,7 +184,7 @@ def test_a_grid_has_the_ends_of_what_is_known(step):
     known[111:203] = False
     known[150] = True  # a key
     known[250:299] = False
-    times = time.grid(known, step)
+    times = time.grid(known[:, None], step)
     assert times[0] == 0
     assert times[-1] == 299
     for frame in (110, 150, 203, 249, 299):
@@ -195,16 +195,28 @@ def test_a_grid_has_the_ends_of_what_is_known(step):
 
 def test_a_grid_at_the_same_rate_is_every_frame():
     known = np.random.default_rng(0).random(100) < 0.5
-    assert np.array_equal(time.grid(known, 1.0), np.arange(100))
-    assert np.array_equal(time.grid(np.zeros(5, bool), 1.0), np.arange(5))
-    assert np.array_equal(time.grid(np.ones(1, bool), 4.0), [0])
+    assert np.array_equal(time.grid(known[:, None], 1.0), np.arange(100))
+    assert np.array_equal(time.grid(np.zeros((5, 2), bool), 1.0), np.arange(5))
+    assert np.array_equal(time.grid(np.ones((1, 2), bool), 4.0), [0])
+
+
+def test_a_grid_has_the_ends_of_what_is_known_of_single_values():
+    """Of a leg that is lost while an arm is: else nothing leads from what is known of it to what is said."""
+    known = np.ones((200, 3), bool)
+    known[50:130, 0] = False
+    known[83:161, 1] = False
+    known[131:140, 2] = False  # nearer to another end than a step: left out
+    times = time.grid(known, 4.0)
+    assert {49.0, 82.0, 130.0, 140.0, 161.0} <= set(times)
+    assert 131.0 not in times
+    assert np.diff(times).min() >= 0.6 * 4
 
 
 def test_a_grid_keeps_the_step_where_little_is_known():
     """Velocities of the two or three frames around a gap are as fast as they are."""
     known = np.zeros(100, bool)
     known[:7] = known[30:36] = True
-    times = time.grid(known, 4.0)
+    times = time.grid(known[:, None], 4.0)
     assert {0.0, 4.0, 30.0, 34.0} <= set(times)
     assert 6.0 not in times
 
@@ -212,6 +224,6 @@ def test_a_grid_keeps_the_step_where_little_is_known():
 def test_a_grid_stays_one_where_frames_drop_out_everywhere():
     """Of known frames that are nearer to each other than its step it takes one."""
     known = np.random.default_rng(1).random(200) < 0.4
-    apart = np.diff(time.grid(known, 4.0))
+    apart = np.diff(time.grid(known[:, None], 4.0))
     assert apart.min() > 2
     assert apart.max() < 6.1

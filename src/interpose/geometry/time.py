@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from bisect import bisect
 from dataclasses import replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -66,16 +67,17 @@ def sample_rotations(q: Array, times: Array) -> Array:
 
 
 def grid(known: np.ndarray, step: float) -> np.ndarray:
-    """Times (n,), in frames, about `step` apart, among which are the ends of each run of `known` frames (F,).
+    """Times (n,), in frames, about `step` apart, among which are the ends of each run of frames in which all
+    values are `known` (F, n), and those of each value's own.
 
     A network at a lower frame rate would not see a key between two of its own frames, and not where exactly a
     gap begins. So its steps are stretched or shortened until they end there; where much is known they hardly
     change. Runs of few known frames keep the step, from their first one on, as it tells velocities; what is
-    nearer to such an end than a good half of a step is left out.
+    nearer to such an end than a good half of a step is left out, and those of single values come last.
     """
-    last = len(known) - 1
+    last, singles = len(known) - 1, np.unique(known, axis=1).T
     ends: set[float] = {0, last}
-    for start, stop in runs(known):
+    for start, stop in runs(np.asarray(known.all(axis=1))):
         whole = math.floor((stop - 1 - start) / step)
         ends |= (
             {start, stop - 1}
@@ -88,6 +90,10 @@ def grid(known: np.ndarray, step: float) -> np.ndarray:
             at.append(end)
     if last > at[-1]:
         at[max(1, len(at) - 1) :] = [last]  # the end of all is always one
+    for end in sorted({end for value in singles for start, stop in runs(value) for end in (start, stop - 1)}):
+        i = bisect(at, end)
+        if end - at[i - 1] >= CLOSE * step and (i == len(at) or at[i] - end >= CLOSE * step):
+            at.insert(i, end)
     pieces = [
         np.linspace(a, b, max(1, round((b - a) / step)), endpoint=False) for a, b in zip(at[:-1], at[1:])
     ]

@@ -77,7 +77,7 @@ class Base:
         base = Spline().complete(clip, observation).clip
         turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
         known = knowledge(observation, body.mapping)
-        times = grid(np.asarray(known.all(axis=1)), clip.fps / card.fps)
+        times = grid(known, clip.fps / card.fps)
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         local = kinematics.local_rotations(turned, PARENTS)

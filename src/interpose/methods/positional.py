@@ -91,7 +91,7 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     coarse, step = card.fps < COARSE, clip.fps / card.fps
     # A coarse one says one frame more where the clip ends between two of its own.
     even = np.round(np.arange(0, len(clip) - 1 + step, step), 9)
-    times = even if coarse else grid(np.asarray(known.all(axis=1)), step)
+    times = even if coarse else grid(known, step)
     before, after = (np.minimum(of(times).astype(int), len(clip) - 1) for of in (np.floor, np.ceil))
     seen = known[before] & known[after] & (times < len(clip))[:, None]
     poses, raw, completed = network(sample(positions, times), seen)
