@@ -225,9 +225,9 @@ def recover(
 ) -> Completion:
     """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
 
-    Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose, and
-    spikes, at any frames but a first or last one that is no part of the motion as a whole: that `scan` finds,
-    and `fill` mends. Other arguments, result and errors are those of `fill`.
+    Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose or
+    jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
+    whole: that `scan` finds, and `fill` mends. Other arguments, result and errors are those of `fill`.
     """
     start, stop = frames or (0, len(clip))
     if joints is None:

@@ -31,6 +31,24 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+def test_arms_that_are_taken_for_each_other_are_found(cmu_walk):
+    """For half a second: too long for a spike. An arm that swings as fast for as long is none."""
+    rotation, names = cmu_walk.rotation.copy(), cmu_walk.skeleton.names
+    arms = [names.index(side + "Arm") for side in ("Left", "Right")]
+    rotation[100:115, arms] = rotation[100:115, arms[::-1]]
+    leg, swing = names.index("RightUpLeg"), 1.5 * np.sin(np.arange(209) / 3)[:, None]
+    rotation[:, leg] = rotations.multiply(rotation[:, leg], rotations.about("X", swing[:, 0]))
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.argwhere(lost).tolist() == [[frame, arm] for frame in range(100, 115) for arm in sorted(arms)]
+
+
+def test_what_jumps_and_does_not_come_back_is_not_lost(cmu_walk):
+    """Neither pose is the wrong one, as far as anybody can tell."""
+    rotation, arm = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftArm")
+    rotation[100:, arm] = rotations.multiply(rotation[100:, arm], rotations.about("X", np.array(1.2)))
+    assert broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).complete
+
+
 def test_a_root_that_jumps_or_falls_to_the_origin_is_found(cmu_walk):
     translation = cmu_walk.translation.copy()
     translation[50] = 0

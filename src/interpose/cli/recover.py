@@ -33,8 +33,9 @@ def recover(
 ) -> int:
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
-    Without --joints it finds what drops out: joints that snap to their rest pose for up to
-    a second, and spikes, at any frames; what else is missing is listed, and `interpose fill` fills it.
+    Without --joints it finds what drops out: joints that snap to their rest pose, or jump away and
+    back (as arms that were taken for each other), within a second, and spikes, at any frames; what
+    else is missing is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -81,7 +82,7 @@ def recover(
         fix = "Name joints that are lost for longer: --joints LeftArm."
         raise RequestError(
             f"there is nothing to recover in {file}",
-            "no joint snaps to its rest pose for up to a second, and none spikes",
+            "no joint snaps to its rest pose, spikes, or jumps away and back within a second",
             f"interpose fill {file} fills what else is missing." if others else fix,
         )
     code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)

@@ -1,4 +1,5 @@
-"""Finding single values that a tracker lost: joints that snap to their rest pose, and spikes."""
+"""Finding single values that a tracker lost: joints that snap to their rest pose, spikes, and what is away
+for a while, as arms that were taken for each other."""
 
 from __future__ import annotations
 
@@ -22,6 +23,10 @@ MANY = 5
 # the median distances within a second on either side.
 SPIKE, TIMES = 0.35, 10.0
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
+# What is away for longer than a spike jumps there and back by more than a spike, and so many times as far as
+# it moves in the two frames before the jump and after it; and what it comes back to is where it was, but for
+# this share of the jumps.
+LEAP, BACK = 4.0, 0.5
 # A spike of a joint is real if what it moves of the joints below comes nearer to its median without it, by
 # this share of the way beyond the first metres. Noise on positions turns short bones by any angle, and what
 # hangs below them is where it should be.
@@ -33,7 +38,8 @@ def broken(clip: Clip) -> Observation:
     """What is left of a clip without values that were lost: an observation of it.
 
     Joints' rotations and the translations of roots are looked at, each for itself: runs of up to LONGEST in
-    which it snaps to its rest value (or to no rotation, or to the origin), and spikes of up to three frames.
+    which it snaps to its rest value (or to no rotation, or to the origin) or jumps away and back, and spikes
+    of up to three frames.
     """
     seen, skeleton, roots = Observation.full(clip), clip.skeleton, list(clip.skeleton.roots)
     none = np.tile(rotations.identity(), (len(skeleton), 1))
@@ -49,13 +55,15 @@ def broken(clip: Clip) -> Observation:
 def _lost(
     values: np.ndarray, homes: list[np.ndarray], fps: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which of the values (F, n, d) snap to one of the `homes` (n, d), which of the others are spikes, both
-    (F, n), and the medians (F, n, d) of what is around each."""
+    """Which of the values (F, n, d) snap to one of the `homes` (n, d) or are away, which of the others are
+    spikes, both (F, n), and the medians (F, n, d) of what is around each."""
     snaps, spikes, usual = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool), values.copy()
     for column in range(values.shape[1]):
         own = values[:, column]
         for home in homes:
             snaps[:, column] |= _snaps(own, home[column], max(1, round(LONGEST * fps)))
+        good = np.flatnonzero(~snaps[:, column])
+        snaps[good, column] = _away(own[good], round(LONGEST * fps))
         good = np.flatnonzero(~snaps[:, column])
         if len(good) > 2 * AROUND:
             spikes[good, column], middle = _spikes(own[good], round(fps))
@@ -92,6 +100,21 @@ def _snaps(values: np.ndarray, home: np.ndarray, longest: int) -> np.ndarray:
         stop = away[i] if i < len(away) else len(values)
         snapped[stop - lengths[i] : stop] = True
     return snapped
+
+
+def _away(values: np.ndarray, longest: int) -> np.ndarray:
+    """(F,) the frames of runs, longer than spikes, that values (F, d) jump into and back out of."""
+    away = np.zeros(len(values), bool)
+    if len(values) <= AROUND + 2:
+        return away
+    steps = _apart(values[1:], values[:-1])
+    beside = ndimage.maximum_filter(steps, footprint=[1, 1, 0, 1, 1], mode="nearest")
+    leaps = np.flatnonzero((steps > SPIKE) & (steps > LEAP * beside))
+    for before, last in zip(leaps[:-1], leaps[1:]):
+        short = AROUND < last - before <= longest and not away[before]
+        if short and _apart(values[last + 1], values[before]) < BACK * min(steps[before], steps[last]):
+            away[before + 1 : last + 1] = True
+    return away
 
 
 def _spikes(values: np.ndarray, second: int) -> tuple[np.ndarray, np.ndarray]:

@@ -71,8 +71,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose, jump or not.
     - "frozen position": the same for a root whose position stands still while the pose does not.
-    - "lost": joints that snap to their rest pose for up to a second, or spikes of up to three frames: what
-      `recover` restores.
+    - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
+      to three frames: what `recover` restores.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
     those that stand still for half of the clip at a stretch: they have no data to be filled from.
