@@ -17,6 +17,7 @@ from interpose.models.stmi_gan import (  # noqa: E402
     StmiGanConfig,
     curve,
     distances,
+    drawable,
     settle,
 )
 
@@ -128,6 +129,17 @@ def test_a_new_network_says_what_it_knows(config):
     given = torch.where(known, x, pose)
     said = said.unflatten(1, (rows, together)).mean(dim=2)
     assert np.corrcoef(said.flatten(), given.flatten())[0, 1] > 0.85
+
+
+def test_what_curves_can_draw_of_a_motion_is_what_they_draw_and_all_that_is_slow():
+    """So that a discriminator compares like with like."""
+    rng, bring, draw = np.random.default_rng(0), drawable(10, 6).values, curve(10, 6).values
+    drawn = draw @ rng.standard_normal((10, 3))
+    assert np.allclose(bring @ drawn, drawn)
+    frames = np.arange(60)
+    slow, fast = np.sin(frames / 20), np.sin(frames * 2.0)
+    assert np.abs(bring @ slow - slow).max() < 0.01
+    assert np.abs(bring @ fast).max() < 0.6
 
 
 def test_curves_go_straight_on_and_through_the_middles_of_rows():

@@ -98,7 +98,7 @@ def test_only_what_is_visible_counts_with_a_discriminator_and_all_without(window
         observed[:, 10:] = False
         wrong = truth.clone()
         wrong[:, 10:] += 0.1
-        right, off = (float(play.told(Motions(truth, observed, made))) for made in (truth, wrong))
+        right, off = (float(play.told(Motions(truth, observed, made, truth))) for made in (truth, wrong))
         assert right < 1e-3
         assert (off > 1.0) == counts
 
@@ -107,9 +107,9 @@ def test_bones_that_are_too_long_cost_everywhere(windows):
     play = game(windows)
     truth = draw(np.random.default_rng(0), windows, play.settings, 2)
     observed = torch.zeros_like(truth, dtype=torch.bool)
-    assert float(play.told(Motions(truth, observed, 1.1 * truth))) > 1.0
+    assert float(play.told(Motions(truth, observed, 1.1 * truth, truth))) > 1.0
     moved = truth + torch.tensor([1.0, 0.0, 0.0])
-    assert float(play.told(Motions(truth, observed, moved))) < 0.01
+    assert float(play.told(Motions(truth, observed, moved, truth))) < 0.01
 
 
 def test_each_side_gains_by_what_is_worse_for_the_other(windows, monkeypatch):
@@ -127,7 +127,8 @@ def test_each_side_gains_by_what_is_worse_for_the_other(windows, monkeypatch):
 
     play = game(windows, gamma=0.0, reconstruction=0.0, limbs=0.0, bones=0.0)
     shape = draw(np.random.default_rng(0), windows, play.settings, 2).shape
-    motions = Motions(torch.ones(shape), torch.ones(shape, dtype=torch.bool), -torch.ones(shape))
+    ones = torch.ones(shape)
+    motions = Motions(ones, ones.bool(), -ones, ones)
     monkeypatch.setattr(play, "play", lambda rng: motions)
     found = []
     for right in (5.0, -5.0):

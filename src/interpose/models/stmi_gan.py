@@ -225,6 +225,13 @@ def curve(rows: int, together: int) -> Constant:
     return Constant(spline(inside) + (frames - inside)[:, None] * spline(inside, 1))
 
 
+@cache
+def drawable(rows: int, together: int) -> Constant:
+    """(frames, frames) what brings a motion to the nearest one, by squares, that a `curve` draws."""
+    drawn = curve(rows, together).values
+    return Constant(drawn @ np.linalg.pinv(drawn))
+
+
 class Generator(nn.Module):
     """A frame encoder, U-blocks on what it writes, and a frame decoder, within the alignment (section 4.1).
 

@@ -40,6 +40,7 @@ from interpose.models.stmi_gan import (
     Generator,
     StmiGanConfig,
     distances,
+    drawable,
 )
 from interpose.observation.corruption import LIMBS, gap_mask
 from interpose.skeletons import JOINTS, PARENTS
@@ -160,11 +161,13 @@ def glance(rng: np.random.Generator, rows: int, *motions: Tensor) -> list[Tensor
 
 @dataclass
 class Motions:
-    """What is trained on: aligned motions (B, rows, 22, 3), what is observed of them, and the network's."""
+    """What is trained on: aligned motions (B, rows, 22, 3), what is observed of them, the network's, and what
+    these are to be taken for: the truth, as far as the network can draw it."""
 
     truth: Tensor
     observed: Tensor
     made: Tensor
+    real: Tensor
 
 
 class Game:
@@ -190,7 +193,11 @@ class Game:
         truth = Frame.of(positions, observed).align(positions)
         with torch.autocast(truth.device.type, torch.bfloat16):
             made = self.generator.aligned(truth, observed, noise(self.generator, len(truth), truth.device))
-        return Motions(*glance(rng, self.settings.network.rows, truth, observed, made.float()))
+        rows, together = self.settings.network.rows, self.settings.network.together
+        # What a curve leaves out would tell the two apart at once, and the network could only answer it by
+        # moving more.
+        real = truth if together == 1 else drawable(rows, together).beside(truth) @ truth.flatten(2)
+        return Motions(*glance(rng, rows, truth, observed, made.float(), real.view_as(truth)))
 
     def opponent_loss(self, rng: np.random.Generator, fraction: float) -> Tensor:
         """Of the discriminator: which motions are the data's, and the R1 penalty on those (equation 4).
@@ -203,7 +210,7 @@ class Game:
         penalised = self.turn % self.settings.every == 0
         self.turn += 1
         judge, std = self.discriminator, self.generator.std
-        truth = (self.motions.truth / std).requires_grad_(penalised)
+        truth = (self.motions.real / std).requires_grad_(penalised)
         with torch.autocast(truth.device.type, torch.bfloat16):
             fake = judge(judge.seen(self.motions.made.detach())).float()
             real = judge(judge.seen(truth * std)).float()
