@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
+
+from safetensors.torch import load_file  # noqa: E402
+
 pytest.importorskip("onnx")
 
 from interpose.errors import RequestError  # noqa: E402
@@ -200,6 +203,12 @@ def test_a_run_learns_stops_and_goes_on(pack, tmp_path, monkeypatch):
 
     export_stmi_gan(tmp_path, [pack], tmp_path / "weights", ["train"])
     card = weights.load(tmp_path / "weights", "stmi-gan")
+    judge = torch.load(tmp_path / "checkpoint.pt", weights_only=False)["opponent"]
+    for name, value in load_file(tmp_path / "weights" / "discriminator.safetensors").items():
+        assert torch.allclose(value.float(), judge[name], atol=1e-3)
+    told.clear()
+    train_stmi_gan([pack], tmp_path / "on", Budget.parse("1steps"), settings, start=card, say=told.append)
+    assert "goes on with the discriminator of stmi-gan" in told
     rng = np.random.default_rng(2)
     positions = draw(rng, Windows([pack], ("train",), 120, torch.device("cpu")), settings, 2).numpy()
     observed = rng.random((2, 20, 22, 3)) < 0.7

@@ -35,6 +35,7 @@ from interpose.training.base import chosen, title
 from interpose.training.cae import NETWORKS
 from interpose.training.loop import shard_paths
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
+from interpose.training.stmi_gan import JUDGE
 
 LICENCES = {
     "lafan1": "CC BY-NC-ND 4.0",
@@ -451,12 +452,17 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
 
 
 def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
-    """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder."""
+    """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder, and the
+    discriminator, against which a run that starts from these weights goes on."""
     run = _Run.of(folder)
     settings, log = run.settings, run.log
     config = StmiGanConfig.of(settings["network"])
     model = Generator(config)
     export_stmi_gan_onnx(model, run.begin(out, "stmi-gan", model))
+    state = torch.load(folder / "checkpoint.pt", map_location="cpu", weights_only=False)
+    if judge := state.get("opponent"):
+        halves = {name: value.half().contiguous() for name, value in judge.items()}
+        (out / JUDGE).write_bytes(save(halves))
     hours = [entry["hours"] for entry in log]
     curve = {"generator": (hours, [entry["loss"] for entry in log])}
     line_plot(curve, "device hours", "weighted loss", "Training of stmi-gan", path=out / "loss.svg")

@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from safetensors.torch import load_file
 from torch import Tensor, nn
 from torch.nn import functional
 
@@ -51,6 +52,7 @@ from interpose.training.loop import Opponent, Settings, Trainer, restore
 from interpose.training.windows import Windows
 
 DATASETS = ("lafan1", "bandai")
+JUDGE = "discriminator.safetensors"  # beside a graph: what its network was trained against
 # Whose distances to all other joints tell most actions apart: hands, feet and head.
 EXTREMITIES = {JOINTS.index(name) for name in ("LeftHand", "RightHand", "LeftToe", "RightToe", "Head")}
 LIMB_PAIRS = Constant([i for i, pair in enumerate(ENDS) if EXTREMITIES & set(pair)])
@@ -287,7 +289,8 @@ def train_stmi_gan(
 ) -> Generator:
     """Train, or go on training, in `folder`; the averaged generator comes back. Arguments as in `train_cae`.
 
-    A run that starts from trained weights begins with a discriminator that knows nothing.
+    A run that starts from trained weights goes on with the discriminator that lies beside them, if one does
+    and it has the same branches, and else with one that knows nothing.
     """
     settings = settings or StmiGanSettings()
     device = pick_device()
@@ -301,6 +304,11 @@ def train_stmi_gan(
         generator.grow(trained(start))
     elif start:
         restore(generator, start.onnx)
+    if start and (judge := start.path.with_name(JUDGE)).exists() and settings.looks:
+        held = {name: value.float() for name, value in load_file(judge).items()}
+        if held.keys() == discriminator.state_dict().keys():
+            discriminator.load_state_dict(held)
+            say(f"goes on with the discriminator of {start.name}")
     if device.type == "cpu":
         quicken(generator)
     for network in (generator, discriminator):
