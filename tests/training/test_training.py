@@ -143,6 +143,7 @@ def test_networks_to_compare_with_learn_and_are_exported_by_the_same_recipe(pack
 
 def test_one_folder_holds_one_network(pack, tmp_path):
     (tmp_path / "settings.json").write_text(json.dumps({"network": "vanilla"}))
+    (tmp_path / "log.jsonl").touch()
     (tmp_path / "cae.onnx").touch()
     with pytest.raises(RequestError, match=r"cae\.onnx is in there"):
         export_cae(tmp_path, [pack], tmp_path, ["train"])
