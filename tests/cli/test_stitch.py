@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import numpy as np
@@ -60,6 +61,10 @@ def test_a_loop_of_one_clip(run, takes):
     assert "frame 0 follows" in done.out
     report = json.loads((takes / "round.json").read_text())
     assert report["loop"]["jump"] <= report["loop"]["limit"]
+    # From the last frame it is one step to where frame 0 stands next.
+    root, way = load(takes / "round.bvh").root, re.search(r"each time ([\d.]+) m on", done.out)
+    assert way is not None
+    assert abs(np.hypot(*(root[-1] - root[0])[::2]) - float(way[1])) < 0.1
     assert len(load(takes / "round.bvh")) == int(report["gaps"][-1]["frames"].split(":")[1])
 
 

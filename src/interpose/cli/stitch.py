@@ -195,7 +195,10 @@ def _closing(done: Stitched) -> list[str]:
     loop = done.loop
     if loop is None:
         return []
-    way, turned = np.hypot(*loop.placement.shift[::2]), np.degrees(loop.placement.yaw)
+    first = done.clip.slice(0, 1)
+    # Turned about the origin, what lies far from it goes a long way: it is the body's own that is meant.
+    way = np.hypot(*(loop.placement.of(first).root - first.root)[0, ::2])
+    turned = np.degrees(loop.placement.yaw)
     lines = [f"loop: {loop.why}"] if loop.why else []
     lines += [f"loop: frame 0 follows frame {len(done.clip) - 1}, each time {way:.2f} m on"]
     lines[-1] += f" and turned by {turned:.0f} degrees" if abs(turned) >= 0.5 else ""
