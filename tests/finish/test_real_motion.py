@@ -9,6 +9,7 @@ import pytest
 
 from interpose import formats, tasks
 from interpose.finish import feet, measures, seams
+from interpose.geometry import rotations
 from interpose.methods import registry
 from interpose.observation import Gap, Observation
 
@@ -131,3 +132,15 @@ def test_what_is_said_of_an_amc_clip_is_what_its_file_holds(data, tmp_path, gap,
     assert formats.save(done, tmp_path / "filled.amc") == ()
     back = formats.load(tmp_path / "filled.amc", skeleton=data / "cmu_02.asf")
     assert np.abs(back.positions() - done.positions()).max() < 1e-4
+
+
+def test_half_a_turn_between_lone_keys_does_not_tear(cmu_walk):
+    """Networks turn all at once there, and no motion is known that would tell how far velocities may jump."""
+    clip = cmu_walk.slice(60, 71)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[10, 0] = rotations.multiply(rotations.about("Y", np.array(np.pi)), rotation[10, 0])
+    translation[10, 0, [0, 2]] = translation[0, 0, [0, 2]]
+    done = tasks.fill(clip.with_motion(rotation, translation), [Gap(1, 10)], "small")
+    (report,) = done.report.gaps
+    assert report.peak < 20
+    assert any("filled by spline instead: the velocity jumps" in note for note in report.notes)

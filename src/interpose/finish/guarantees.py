@@ -525,8 +525,8 @@ def _excess(
 ) -> tuple[float, str, int]:
     """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
     words, and at which frame; words call the first frame `first`."""
-    if bounds is None:
-        return 0.0, "", span.start
+    # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
+    bounds = bounds or _Bounds(math.inf, TORN / current.fps**2)
     found, names = [(0.0, "", span.start)], current.skeleton.names
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
