@@ -39,7 +39,27 @@ def test_arms_that_are_taken_for_each_other_are_found(cmu_walk):
     leg, swing = names.index("RightUpLeg"), 1.5 * np.sin(np.arange(209) / 3)[:, None]
     rotation[:, leg] = rotations.multiply(rotation[:, leg], rotations.about("X", swing[:, 0]))
     lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert lost[100:115][:, arms].all()
+    assert not lost[:, leg].any()
+    assert not np.delete(lost, slice(100, 115), axis=0).any()
+
+
+def test_of_limbs_that_are_taken_for_each_other_all_joints_are_lost(cmu_walk):
+    """Also those that do not jump, as they are turned alike on either side; where one side alone is away the
+    other stays."""
+    rotation, names = cmu_walk.rotation.copy(), cmu_walk.skeleton.names
+    arms = [
+        names.index(side + part)
+        for side in ("Left", "Right")
+        for part in ("Shoulder", "Arm", "ForeArm", "Hand")
+    ]
+    rotation[100:115, arms] = rotation[100:115, arms[4:] + arms[:4]]
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
     assert np.argwhere(lost).tolist() == [[frame, arm] for frame in range(100, 115) for arm in sorted(arms)]
+    rotation = cmu_walk.rotation.copy()
+    rotation[100:115, arms[1]] = rotation[100:115, arms[5]]
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.argwhere(lost).tolist() == [[frame, arms[1]] for frame in range(100, 115)]
 
 
 def test_what_jumps_and_does_not_come_back_is_not_lost(cmu_walk):

@@ -8,7 +8,9 @@ from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
+from interpose.observation.corruption import LIMBS
 from interpose.observation.observation import Observation
+from interpose.skeletons import SIDES, find_mapping
 
 # A value is the rest pose if it differs by less (radians, metres): files keep seven digits or so.
 SAME = 1e-5
@@ -43,32 +45,51 @@ def broken(clip: Clip) -> Observation:
     """
     seen, skeleton, roots = Observation.full(clip), clip.skeleton, list(clip.skeleton.roots)
     none = np.tile(rotations.identity(), (len(skeleton), 1))
-    lost, spikes, usual = _lost(rotations.continuous(clip.rotation), [skeleton.rest_rotation, none], clip.fps)
+    turned = rotations.continuous(clip.rotation)
+    snaps, away, spikes, usual = _lost(turned, [skeleton.rest_rotation, none], clip.fps)
+    lost = snaps | _exchanged(clip, away)
     seen.rotation[lost | (spikes & _real(clip, lost, spikes, usual))] = False
     places = clip.translation[:, [clip.translated.index(root) for root in roots]]
     homes = [skeleton.rest_translation[roots], np.zeros((len(roots), 3))]
-    lost, spikes, _ = _lost(places, homes, clip.fps)
-    seen.translation[:, roots] = ~(lost | spikes)
+    snaps, away, spikes, _ = _lost(places, homes, clip.fps)
+    seen.translation[:, roots] = ~(snaps | away | spikes)
     return seen
 
 
 def _lost(
     values: np.ndarray, homes: list[np.ndarray], fps: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which of the values (F, n, d) snap to one of the `homes` (n, d) or are away, which of the others are
-    spikes, both (F, n), and the medians (F, n, d) of what is around each."""
-    snaps, spikes, usual = np.zeros(values.shape[:2], bool), np.zeros(values.shape[:2], bool), values.copy()
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Which of the values (F, n, d) snap to one of the `homes` (n, d), which of the others are away, which of
+    the rest are spikes, each (F, n), and the medians (F, n, d) of what is around each."""
+    snaps, away, spikes = (np.zeros(values.shape[:2], bool) for _ in range(3))
+    usual = values.copy()
     for column in range(values.shape[1]):
         own = values[:, column]
         for home in homes:
             snaps[:, column] |= _snaps(own, home[column], max(1, round(LONGEST * fps)))
         good = np.flatnonzero(~snaps[:, column])
-        snaps[good, column] = _away(own[good], round(LONGEST * fps))
-        good = np.flatnonzero(~snaps[:, column])
+        away[good, column] = _away(own[good], round(LONGEST * fps))
+        good = np.flatnonzero(~(snaps | away)[:, column])
         if len(good) > 2 * AROUND:
             spikes[good, column], middle = _spikes(own[good], round(fps))
             usual[:, column] = middle[np.searchsorted(good, np.arange(len(own))).clip(max=len(good) - 1)]
-    return snaps, spikes, usual
+    return snaps, away, spikes, usual
+
+
+def _exchanged(clip: Clip, away: np.ndarray) -> np.ndarray:
+    """(F, J) what is `away`; and where joints of both arms are, or of both legs, all of these limbs.
+
+    They were taken for each other, also where a joint of one is turned much as that of the other.
+    """
+    joints, found = find_mapping(clip.skeleton).joints, away.copy()
+    for limb in LIMBS:
+        both = [
+            [joint for row in rows if (joint := joints[row]) is not None]
+            for rows in (limb, [SIDES[row] for row in limb])
+        ]
+        left, right = (away[:, side].any(axis=1, keepdims=True) for side in both)
+        found[:, both[0] + both[1]] |= left & right
+    return found
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
