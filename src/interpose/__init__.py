@@ -132,7 +132,7 @@ def fill(
         seed: for methods that sample.
         progress: called with the share done, 0 to 1.
         parts: poses of single joints that other clips give inside of the gaps.
-        path: floor points (x and z in metres) that the root is led over, by frame: {130: (1.2, 0.4)}.
+        path: floor points (x and z in metres) that the hips are led over, by frame: {130: (1.2, 0.4)}.
         pins: where joints are to be at frames inside of gaps: Pin("LeftHand", [130], [[0.3, 1.4, 0.2]]) in
             metres, Y up. What is out of reach is met as nearly as it can be, and reported.
 

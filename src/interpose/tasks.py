@@ -84,7 +84,7 @@ def fill(
         progress: called with the share done, 0 to 1.
         action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
         parts: poses of single joints that other clips give inside of the gaps.
-        path: x and z in metres that the root is led over, by frame; inside of gaps of the whole pose.
+        path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
         temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
 
@@ -313,7 +313,7 @@ def between(
         raise RequestError(
             "there is nothing between the keys",
             f"the keys are {', '.join(map(str, chosen)) or 'none'}",
-            "Name two or more that are apart: 0,30,75.",
+            "Name some that are apart: 0,30,75. Of a file of poses: --start a.bvh#0 --target a.bvh#1.",
         )
     return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from interpose.formats import load
+from interpose.formats import load, save
 
 
 def test_keys_come_back_and_the_rest_is_new(run, take):
@@ -63,6 +64,29 @@ def test_a_length_is_proposed_with_its_reason(run, take):
     same = ("between", "--start", "take.bvh#20", "--target", "take.bvh#20", "-o", "b.bvh")
     assert run(*same).code == 0
     assert len(load(take.with_name("b.bvh"))) == 3
+
+
+def test_a_proposal_begins_at_the_last_anchor(run, take):
+    poses = ["--start", "take.bvh#20", "--anchor", "take.bvh#60@90", "--target", "take.bvh#80"]
+    done = run("between", *poses, "-o", "a.bvh", "--method", "spline")
+    assert done.code == 0
+    assert "after the anchor at 90" in done.out
+    made, source = load(take.with_name("a.bvh")), load(take)
+    assert 100 <= len(made) - 2 <= 120
+    assert np.array_equal(made.rotation[90], source.rotation[60])
+    assert np.array_equal(made.rotation[-1], source.rotation[80])
+
+
+def test_a_target_of_another_body_stands_on_the_floor(run, take):
+    """A body twice as large, whose pose comes back on the one that the motion begins with."""
+    source = load(take)
+    skeleton = replace(source.skeleton, rest_translation=2 * source.skeleton.rest_translation)
+    large = replace(source, skeleton=skeleton, translation=2 * source.translation, source=None)
+    save(large, take.with_name("large.bvh"))
+    run("between", "--start", "take.bvh#20", "--target", "large.bvh#80", "--frames", "30", "-o", "a.bvh")
+    made = load(take.with_name("a.bvh"))
+    assert made.root[-1, 1] == pytest.approx(source.root[80, 1], abs=1e-4)
+    assert np.allclose(made.rotation[-1], source.rotation[80], atol=1e-5)
 
 
 @pytest.mark.parametrize(

@@ -38,9 +38,9 @@ def between(
     """Generate the motion between key poses; the keys themselves come back unchanged.
 
     Keys are frames of one file, or poses of several: then the motion begins
-    with --start, --frames new frames follow, and --target is the last. What
-    lies between the keys of a file has no influence; what lies before the
-    first and after the last one stays as it is. Writes the clip and a report
+    with --start, --frames new frames follow, and --target is the last, on the
+    body of --start. What lies between the keys of a file has no influence; what
+    lies before the first and after the last one stays as it is. Writes the clip and a report
     beside the input: keys.between.bvh and keys.between.json.
 
     Try:
@@ -54,7 +54,8 @@ def between(
         keys: the frames of the file that are keys, separated by commas, counted from 0.
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
-        frames: how many frames to generate between --start and --target; auto, the default, proposes it.
+        frames: how many frames to generate between --start and --target; auto, the default, proposes it (from
+            the last anchor on).
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
         action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
@@ -79,7 +80,7 @@ def between(
         raise RequestError(
             "it is not clear what the keys are",
             "they are frames of one file, or poses of several",
-            "Write keys.bvh --keys 0,30,75, or --start a.bvh --target b.bvh --frames 45.",
+            "Write keys.bvh --keys 0,30,75, or --start a.bvh#0 --target a.bvh#2 --anchor a.bvh#1@30.",
         )
     outputs = Outputs.choose(file, output, "between", player)
     outputs.check(file, force)
@@ -100,30 +101,38 @@ def _blocked(
     """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip, and
     a line for the user where the length was proposed."""
     from interpose import tasks
-    from interpose.observation.timeline import plausible_length
+    from interpose.observation.timeline import fit, plausible_length
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
-    said = ""
-    # Of one character, or it is refused.
-    tasks.block({0: _frame_of(before, last), 1: _frame_of(after, first)})
+    held = _frame_of(before, last)
+    poses = {0: held}
+    for text in anchors:
+        what, _, at = text.rpartition("@")
+        if not what or not at.isdecimal() or int(at) < 1:
+            why = "it is FILE@AT, with AT from 1 on"
+            raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
+        _, clip, frame = _pose(what, 0, reading)
+        poses[int(at)] = fit(_frame_of(clip, frame), held)[0]
+    met, end, said = max(poses), fit(_frame_of(after, first), held)[0], ""
     if frames == "auto":
-        count, why = plausible_length(before, last, after, first)
-        said = f"{count} frames: {why}"
+        # On to the target from the last pose before it; when anchors are met was said.
+        beside = fit(after, before)[0]
+        moment = min(round(first * before.fps / after.fps), len(beside) - 1)
+        here = (poses[met], 0) if met else (before, last)
+        count, why = plausible_length(*here, beside, moment)
+        count += met
+        said = f"{count} frames: {why}" + (f" after the anchor at {met}" if met else "")
     elif frames.isdecimal() and int(frames) > 0:
         count = int(frames)
     else:
         raise RequestError(
             f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
         )
-    poses = {0: _frame_of(before, last), count + 1: _frame_of(after, first)}
-    for text in anchors:
-        what, _, at = text.rpartition("@")
-        if not what or not at.isdecimal() or not 0 < int(at) <= count:
-            why = f"it is FILE@AT, with AT from 1 to {count}"
-            raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
-        _, clip, frame = _pose(what, 0, reading)
-        poses[int(at)] = _frame_of(clip, frame)
+    if met > count:
+        why = f"--target is frame {count + 1}"
+        raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {count}.")
+    poses[count + 1] = end
     return file, sorted(poses), tasks.block(poses), said
 
 

@@ -14,6 +14,7 @@ from interpose.cli.outputs import Outputs, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
 from interpose.observation import Gap
+from interpose.skeletons.carrier import hips_of
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
@@ -195,9 +196,9 @@ def _closing(done: Stitched) -> list[str]:
     loop = done.loop
     if loop is None:
         return []
-    first = done.clip.slice(0, 1)
     # Turned about the origin, what lies far from it goes a long way: it is the body's own that is meant.
-    way = np.hypot(*(loop.placement.of(first).root - first.root)[0, ::2])
+    hips = done.clip.slice(0, 1).positions()[0, hips_of(done.clip.skeleton)]
+    way = np.hypot(*(loop.placement.at(hips) - hips)[::2])
     turned = np.degrees(loop.placement.yaw)
     lines = [f"loop: {loop.why}"] if loop.why else []
     lines += [f"loop: frame 0 follows frame {len(done.clip) - 1}, each time {way:.2f} m on"]

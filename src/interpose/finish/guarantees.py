@@ -16,7 +16,7 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import feet, measures, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
-from interpose.finish.path import follow, spans
+from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.windows import grow
@@ -44,7 +44,7 @@ MOST = 0.5
 SUNK = 0.05
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
-# A path on which the root goes this much further than without it is said to be too long.
+# A path on which the hips go this much further than without it is said to be too long.
 FURTHER = 1.5
 # Frames solved at once.
 CHUNK = 4096
@@ -125,7 +125,7 @@ def complete(
         fallback: the simpler method.
         limit: metres per frame squared, the largest velocity jump allowed at a seam, when `clip` is a window
             of a longer one. Default: the 95th percentile of the clip's own.
-        path: x and z in metres that the root is to be over, by frame; inside of gaps of the whole pose.
+        path: x and z in metres that the hips are to be over, by frame; inside of gaps of the whole pose.
         first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
     Raises:
@@ -276,7 +276,7 @@ def _along(
     limit: float | None,
     first: int,
 ) -> Completion:
-    """Complete a clip, lead the root along the path, and make the result usable once more."""
+    """Complete a clip, lead the hips along the path, and make the result usable once more."""
     gaps = spans(clip, known, path)
     body = complete(clip, observation, method, seed, fallback, limit, first=first)
     led = body.clip
@@ -286,16 +286,16 @@ def _along(
     nothing = np.zeros_like(known.rotation)
     layer = Layer(method.name, led, body.raw, nothing, stands=False)
     done = _told_of(body, complete(clip, observation, layer, seed, layer, limit, first=first))
+    ways = over_floor(body.clip), over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
-        off = [done.clip.root[f, [0, 2]] - p for f, p in path.items() if gap.start <= f < gap.stop]
+        off = [ways[1][f] - p for f, p in path.items() if gap.start <= f < gap.stop]
         if not off:
             return gap
         missed = 100 * float(np.linalg.norm(off, axis=1).max())
         notes = [f"the path is met within {missed:.1f} cm"]
         own, new = (
-            np.linalg.norm(np.diff(c.root[gap.start - 1 : gap.stop + 1, [0, 2]], axis=0), axis=1).sum()
-            for c in (body.clip, done.clip)
+            np.linalg.norm(np.diff(way[gap.start - 1 : gap.stop + 1], axis=0), axis=1).sum() for way in ways
         )
         if new > FURTHER * own:
             notes.append(
@@ -344,6 +344,7 @@ def _pinned(
     done = _told_of(body, complete(clip, free, layer, seed, layer, limit, first=first))
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
     away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(body.clip, asked)}
+    way = over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
         inside = [one for one in off if gap.start <= one[1] < gap.stop]
@@ -362,11 +363,7 @@ def _pinned(
                 f"flagged: {where[0]} is pinned {far:.1f} m from where it would be at frame {where[1]}: "
                 "is the unit right?"
             )
-        points = [
-            np.linalg.norm(done.clip.root[f, [0, 2]] - p)
-            for f, p in (path or {}).items()
-            if gap.start <= f < gap.stop
-        ]
+        points = [np.linalg.norm(way[f] - p) for f, p in (path or {}).items() if gap.start <= f < gap.stop]
         if points:
             notes.append(f"the path is met within {100 * max(points):.1f} cm")
             gap = replace(gap, path=100 * float(max(points)))

@@ -18,19 +18,22 @@ from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
+from interpose.skeletons.carrier import carriers, hips_of, moved
 
 # Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.
 SLOW = 0.25
 SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
+FLOOR = np.array([1.0, 0.0, 1.0])
 EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
 
 
 def spans(clip: Clip, known: Observation, path: Iterable[int]) -> list[tuple[int, int]]:
-    """The runs of frames, start to stop - 1, in which a path can lead the root.
+    """The runs of frames, start to stop - 1, in which a path can lead the body.
 
     Raises RequestError for a frame of the path that lies in none.
     """
-    unknown = ~known.rotation[:, clip.skeleton.roots[0]]
+    hips = hips_of(clip.skeleton)
+    unknown = np.logical_not(known.rotation[:, [hips, *clip.skeleton.ancestors(hips)]].any(axis=1))
     found = [(start, stop) for start, stop in runs(unknown) if start > 0 and stop < len(clip)]
     for frame in path:
         if not any(start <= frame < stop for start, stop in found):
@@ -42,30 +45,47 @@ def spans(clip: Clip, known: Observation, path: Iterable[int]) -> list[tuple[int
     return found
 
 
+def over_floor(clip: Clip) -> np.ndarray:
+    """(F, 2) x and z of the hips in metres: what a path leads."""
+    return clip.positions()[:, hips_of(clip.skeleton)][:, [0, 2]]
+
+
 def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) -> Clip:
-    """The clip with its first root led through points over frames start to stop - 1.
+    """The clip with its hips led through points over frames start to stop - 1.
 
     Both ends stay where they are, and come and go at the same velocity; in between the way is moved by a
-    cubic spline that meets the points. The root is turned by as much as the direction of the way has changed.
+    cubic spline that meets the points. The body is turned by as much as the direction of the way has changed;
+    a root above the hips goes along if it moves at all.
 
     Args:
         clip: F frames; start is at least 1 and stop at most F - 1.
         points: x and z in metres for frames from start to stop - 1.
     """
     frames = np.arange(start - 1, stop + 1)
-    knots = [start - 1, *sorted(points), stop]
-    off = [np.zeros(2), *(points[k] - clip.root[k, [0, 2]] for k in sorted(points)), np.zeros(2)]
-    moved = CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
-    old = clip.root[frames][:, [0, 2]]
-    headings, speeds = zip(*(_way(some, clip.fps) for some in (old, old + moved)))
+    knots, places = [start - 1, *sorted(points), stop], over_floor(clip)
+    off = [np.zeros(2), *(points[k] - places[k] for k in sorted(points)), np.zeros(2)]
+    shift = CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
+    old = places[frames]
+    headings, speeds = zip(*(_way(some, clip.fps) for some in (old, old + shift)))
     # A heading says something only while there is a way, before and after.
     share = ramp(np.minimum(*speeds) / SLOW - 1)
     share *= ramp(np.minimum(frames - frames[0], frames[-1] - frames) / (EASE * clip.fps))
-    turn = share * np.angle(np.exp(1j * (headings[1] - headings[0])))
+    turn = rotations.about("Y", share * np.angle(np.exp(1j * (headings[1] - headings[0]))))
+    inside = clip.slice(start, stop)
+    turned, placed = inside.kinematics()
+    hips = placed[:, hips_of(clip.skeleton)]
+    led = moved(
+        inside,
+        {
+            joint: (
+                rotations.multiply(turn[1:-1], turned[:, joint]),
+                hips + shift[1:-1, [0, 0, 1]] * FLOOR + rotations.rotate(turn[1:-1], placed[:, joint] - hips),
+            )
+            for joint in carriers(clip)
+        },
+    )
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
-    root, inside = clip.skeleton.roots[0], slice(start, stop)
-    rotation[inside, root] = rotations.multiply(rotations.about("Y", turn[1:-1]), rotation[inside, root])
-    translation[inside, clip.translated.index(root)] += moved[1:-1, [0, 0, 1]] * [1.0, 0.0, 1.0]
+    rotation[start:stop], translation[start:stop] = led.rotation, led.translation
     return clip.with_motion(rotation, translation)
 
 

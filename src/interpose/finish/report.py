@@ -48,7 +48,7 @@ class GapReport:
         penetration: cm, how deep the body goes into itself; a note says where if that is out of the ordinary.
         liveliness: how much the body moves in the middle of the gap, as a share of how much around it; a note
             says so where it hardly moves.
-        path: cm, by how much the root misses points of the path that was asked for.
+        path: cm, by how much the hips miss points of the path that was asked for.
         pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
         expected: cm that joints are expected to be off by in the mean, by a network that says so.

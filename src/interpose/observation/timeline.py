@@ -20,6 +20,7 @@ from interpose.observation.observation import Gap
 from interpose.observation.part import SAME
 from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
+from interpose.skeletons.carrier import STILL, carriers, hips_of, moved
 from interpose.skeletons.humanoid import Humanoid
 
 MOMENT = 0.5  # seconds at an end of a clip that tell where it is heading, and at which pace
@@ -30,7 +31,6 @@ PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
 # What is unhurried: turns of a joint (degrees a second), getting up or down (metres a second), and changes of
 # pace (metres a second, a second). A step takes STEP seconds, and a transition that is shorter slides.
 TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
-STILL = 1e-3  # metres: a joint that moves less against its parent does not move
 
 
 @dataclass(frozen=True)
@@ -40,16 +40,31 @@ class Placement:
     yaw: float = 0.0
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
-    def of(self, clip: Clip) -> Clip:
-        """The clip turned and shifted; bit for bit the same where there is nothing to do."""
+    def of(self, clip: Clip, carried: Sequence[int] = ()) -> Clip:
+        """The clip turned and shifted; bit for bit the same where there is nothing to do.
+
+        Args:
+            clip: what is placed.
+            carried: the joints that are moved, with what hangs from them (`carriers`); the roots without any.
+        """
         if self == Placement():
             return clip
-        rotation, translation = clip.rotation.copy(), clip.translation.copy()
-        roots = list(clip.skeleton.roots)
-        rotation[:, roots] = rotations.multiply(rotations.about("y", np.array(self.yaw)), rotation[:, roots])
-        columns = [clip.translated.index(root) for root in roots]
-        translation[:, columns] = turn(translation[:, columns], np.array(self.yaw)) + self.shift
-        return clip.with_motion(rotation, translation)
+        turned, placed = clip.kinematics()
+        yaw = np.array(self.yaw)
+        return moved(
+            clip,
+            {
+                joint: (
+                    rotations.multiply(rotations.about("y", yaw), turned[:, joint]),
+                    self.at(placed[:, joint]),
+                )
+                for joint in carried or clip.skeleton.roots
+            },
+        )
+
+    def at(self, points: np.ndarray) -> np.ndarray:
+        """Points (..., 3) turned and shifted."""
+        return np.asarray(turn(points, np.array(self.yaw)) + self.shift)
 
 
 @dataclass(frozen=True)
@@ -137,20 +152,21 @@ def lay(
         fitted.append((first.slice(0, round(AGAIN * first.fps) + 1), 1.0))
     counts = _counts(frames, len(fitted) - 1)
     # Handedness and rest pose are found from all of the motion: single short clips must not decide.
-    body = find_humanoid(_joined(first, [clip for clip, _ in fitted]))
+    everything = _joined(first, [clip for clip, _ in fitted])
+    body, carried = find_humanoid(everything), carriers(everything)
     done, laid, gaps = [first], [Laid(first.name, 0, len(first))], []
     for (clip, scale), count in zip(fitted[1:], counts):
         before, start = done[-1], laid[-1].stop
         last, then, why = end(body, before, -1), end(body, clip, 0), ""
         yaw = float(wrap(np.array(last.course - then.course))) if align else 0.0
-        turned = Placement(yaw).of(clip)
+        turned = Placement(yaw).of(clip, carried)
         if count is None and align:
             count, why = unhurried_length(body, before, turned)
         elif count is None:
             count, why = plausible_length(before, len(before) - 1, clip, 0)
         placed = ahead(last, then, yaw, (count + 1) / first.fps) if align else Placement()
         held = before.slice(len(before) - 1, len(before))
-        done += [held] * count + [placed.of(clip)]
+        done += [held] * count + [placed.of(clip, carried)]
         gaps.append(Gap(start, start + count))
         laid.append(Laid(clip.name, start + count, start + count + len(clip), placed, scale, why))
     again = laid.pop() if loop else None
@@ -206,7 +222,8 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
         )
     rest = clip.skeleton.rest_translation[order]
     scale = 1.0
-    inner = [joint for joint in range(len(mine)) if joint not in mine.roots]
+    placed = [joint for joint in like.translated if order[joint] in clip.translated]
+    inner = [joint for joint in range(len(mine)) if joint not in placed]
     if not np.allclose(rest[inner], mine.rest_translation[inner], atol=STILL):
         bodies = find_mapping(clip.skeleton), find_mapping(mine)
         if all(body.usable for body in bodies):
@@ -225,7 +242,7 @@ def _matched(clip: Clip, like: Clip) -> list[int]:
     """For each joint of `like` the same one of `clip`; RequestError where they are not the same."""
     mine, other = like.skeleton, clip.skeleton
     what = f"{clip.name or 'a clip'} is on another skeleton than {like.name or 'the first one'}"
-    fix = "Stitch clips of one character, or of others on the same rig."
+    fix = "Use clips of one character, or of others on the same rig."
     if odd := sorted({*mine.names} ^ {*other.names}):
         raise RequestError(what, f"joints that only one of them has: {', '.join(odd[:6])}", fix)
     order = [other.names.index(name) for name in mine.names]
@@ -237,7 +254,8 @@ def _matched(clip: Clip, like: Clip) -> list[int]:
         )
     )
     bones = rotations.between(mine.rest_translation, other.rest_translation[order])
-    bones[list(mine.roots)] = rotations.identity()
+    # What has its place in every frame rests nowhere.
+    bones[[joint for joint in like.translated if order[joint] in clip.translated]] = rotations.identity()
     apart = np.maximum(
         rotations.angle(mine.rest_rotation, other.rest_rotation[order]),
         rotations.angle(rotations.identity(), bones),
@@ -265,13 +283,12 @@ def end(body: Humanoid, clip: Clip, frame: int) -> End:
     """
     count = round(MOMENT * clip.fps) + 1
     part = clip.slice(0, count) if frame == 0 else clip.slice(max(0, len(clip) - count), len(clip))
-    hips = body.mapping["Hips"] if body.mapping.usable else clip.skeleton.roots[0]
-    assert hips is not None
+    hips = hips_of(clip.skeleton)
     places = part.positions()[:, hips]
     way = (places[-1] - places[0]) * [1.0, 0.0, 1.0]
     velocity = way / max(len(part) - 1, 1) * clip.fps
     if not body.mapping.usable:
-        root = rotations.twist_about(part.rotation[frame, hips], np.array([0.0, 1.0, 0.0]))
+        root = rotations.twist_about(part.kinematics()[0][frame, hips], np.array([0.0, 1.0, 0.0]))
         return End(places[frame], velocity, float(2 * np.arctan2(root[2], root[0])))
     course = float(facing(body.positions(part.slice(0, len(part)))[frame]) * body.hand[0])
     travel = float(np.arctan2(velocity[0], velocity[2]))
@@ -297,14 +314,12 @@ def unhurried_length(body: Humanoid, before: Clip, after: Clip) -> tuple[int, st
     furthest to turn (at TURN), the hips up or down (RISE), the change of pace (CHANGE), and at least a STEP.
     """
     last, then = end(body, before, -1), end(body, after, 0)
-    turns = np.degrees(rotations.angle(before.rotation[-1], after.rotation[0]))
-    joint = int(turns.argmax())
+    name, turn = _furthest(before.slice(len(before) - 1, len(before)), after.slice(0, 1))
     rise = abs(float(then.place[1] - last.place[1]))
     change = float(np.linalg.norm(then.velocity - last.velocity))
-    name = before.skeleton.names[joint]
     needed, why = max(
         (STEP, f"a step takes {STEP:.1f} s"),
-        (turns[joint] / TURN, f"{name} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"),
+        (turn / TURN, f"{name} turns by {turn:.0f} degrees at {TURN:.0f} a second"),
         (rise / RISE, f"the hips go {rise:.2f} m up or down at {RISE:.1f} m/s"),
         (change / CHANGE, f"the pace changes by {change:.1f} m/s at {CHANGE:.1f} a second"),
     )
@@ -314,22 +329,37 @@ def unhurried_length(body: Humanoid, before: Clip, after: Clip) -> tuple[int, st
 def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[int, str]:
     """How many frames a motion takes from frame `last` of one clip to frame `first` of another, and why.
 
-    As long as the hips need for the way at the pace of the two clips (of the second beside the pose; people
-    who stand set off at PACE), or, if that is longer, as the joint that has furthest to turn needs at TURN.
+    As long as what takes longest: the way of the hips at the pace of the two clips (of the second beside the
+    pose; people who stand set off at PACE), the hips up or down (RISE), the joint that has furthest to turn
+    (at TURN).
     """
     fps = start.fps
-    here, there = start.root[last], target.root[first]
-    way = float(np.linalg.norm((there - here)[[0, 2]]))
-    paces = []
+    places, paces = [], []
     for clip, frame in ((start, last), (target, first)):
         lo, hi = max(0, frame - round(clip.fps)), min(len(clip), frame + round(clip.fps) + 1)
-        steps = np.linalg.norm(np.diff(clip.root[lo:hi, [0, 2]], axis=0), axis=1) * clip.fps
+        hips = clip.slice(lo, hi).positions()[:, hips_of(clip.skeleton)]
+        steps = np.linalg.norm(np.diff(hips[:, [0, 2]], axis=0), axis=1) * clip.fps
         paces.append(float(steps.mean()) if len(steps) else 0.0)
+        places.append(hips[frame - lo])
+    way = float(np.linalg.norm((places[1] - places[0])[[0, 2]]))
     pace = max(paces) if max(paces) > STANDS else PACE
-    turns = np.degrees(rotations.angle(start.rotation[last], target.rotation[first]))
-    joint = int(turns.argmax())
-    by_way, by_turn = way / pace, float(turns[joint]) / TURN
-    count = max(1, round(max(by_way, by_turn) * fps) - 1)
-    if by_way >= by_turn:
-        return count, f"{way:.2f} m at {pace:.1f} m/s"
-    return count, f"{start.skeleton.names[joint]} turns by {turns[joint]:.0f} degrees at {TURN:.0f} a second"
+    rise = abs(float(places[1][1] - places[0][1]))
+    name, turn = _furthest(start.slice(last, last + 1), target.slice(first, first + 1))
+    needed, why = max(
+        (way / pace, f"{way:.2f} m at {pace:.1f} m/s"),
+        (rise / RISE, f"the hips go {rise:.2f} m up or down at {RISE:.1f} m/s"),
+        (turn / TURN, f"{name} turns by {turn:.0f} degrees at {TURN:.0f} a second"),
+    )
+    return max(1, round(needed * fps) - 1), why
+
+
+def _furthest(one: Clip, other: Clip) -> tuple[str, float]:
+    """The joint of the body that has furthest to turn from one pose to another, and by how many degrees."""
+    skeleton = one.skeleton
+    hips = hips_of(skeleton)
+    turns = rotations.angle(one.rotation[0], other.rotation[0])
+    # Hips may hang from what is no part of the body.
+    turns[hips] = rotations.angle(one.kinematics()[0][0, hips], other.kinematics()[0][0, hips])
+    body = [hips, *(joint for joint in range(len(skeleton)) if hips in skeleton.ancestors(joint))]
+    joint = max(body, key=lambda joint: turns[joint])
+    return skeleton.names[joint], float(np.degrees(turns[joint]))

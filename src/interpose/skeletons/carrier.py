@@ -1,0 +1,74 @@
+"""What carries a body over the floor: the hips, or a joint above them that goes along.
+
+Game engines hang the hips from a root at the origin. In some files it goes where the character goes; in
+others it stays where it is, and is no part of the body's way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from interpose.clip import Clip, Skeleton
+from interpose.geometry import rotations
+from interpose.skeletons.mapping import find_mapping
+
+STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
+
+
+def hips_of(skeleton: Skeleton) -> int:
+    """The joint that is the hips; of what is no humanoid, its first root."""
+    hips = find_mapping(skeleton)["Hips"]
+    return skeleton.roots[0] if hips is None else hips
+
+
+def carriers(clip: Clip) -> list[int]:
+    """The joints that all of a motion hangs from: to move them is to move the motion.
+
+    The first is the topmost joint from the hips upwards that moves; then other roots, and what moves beside
+    the hips below a root that stays where it is (targets of feet and hands, in rigs of game engines).
+    """
+    skeleton = clip.skeleton
+    hips = hips_of(skeleton)
+    line = [joint for joint in (*skeleton.ancestors(hips)[::-1], hips) if joint in clip.translated]
+    top = next((joint for joint in line if not _still(clip, joint)), line[-1])
+    above = skeleton.ancestors(top)
+    others = [root for root in skeleton.roots if root != top and root not in above]
+    aside = [
+        joint
+        for joint in clip.translated
+        if skeleton.parents[joint] in above and joint not in (top, *above) and not _still(clip, joint)
+    ]
+    return [top, *others, *aside]
+
+
+def moved(clip: Clip, places: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> Clip:
+    """The clip with joints at other places.
+
+    Args:
+        clip: F frames.
+        places: by joint, the global rotations (F, 4) and positions (F, 3) that it is to have. None of the
+            joints hangs from another one of them, and each has translations of its own.
+    """
+    skeleton = clip.skeleton
+    turned, placed = clip.kinematics()
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    for joint, (turn, place) in places.items():
+        parent = skeleton.parents[joint]
+        if parent >= 0:
+            back = rotations.conjugate(turned[:, parent])
+            turn = rotations.multiply(back, turn)
+            place = rotations.rotate(back, place - placed[:, parent]) / skeleton.scale_above[joint]
+        rotation[:, joint] = turn
+        translation[:, clip.translated.index(joint)] = place
+    return clip.with_motion(rotation, translation)
+
+
+def _still(clip: Clip, joint: int) -> bool:
+    """Whether a joint keeps its place and how it is turned, against its parent."""
+    if not len(clip):
+        return True
+    place = clip.translation[:, clip.translated.index(joint)]
+    turns = rotations.angle(clip.rotation[0, joint], clip.rotation[:, joint])
+    return bool(np.ptp(place, axis=0).max() < STILL and turns.max() < STILL)

@@ -1,0 +1,115 @@
+"""Rigs of game engines: a root above the hips that stays where it is, or goes along."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose.clip import Clip, Skeleton
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn
+from interpose.observation.timeline import Placement, lay, plausible_length
+from interpose.skeletons.carrier import carriers, hips_of, moved
+
+TARGET = 2  # an IK target beside the hips, where the left foot is
+
+
+def under_root(clip: Clip, goes: bool, hips_rest: float = 0.9) -> Clip:
+    """The same motion on a rig whose hips, and a target of the left foot, hang from a root.
+
+    The root is turned as programs with Z up write it. It stays at the origin, or `goes` below the hips.
+    """
+    old = clip.skeleton
+    above = (-1, 0, 0, *(1 if parent == 0 else parent + 2 for parent in old.parents[1:]))
+    names = ("root", old.names[0], "ik_foot_l", *old.names[1:])
+    rest = np.insert(old.rest_translation, [0, 1], 0.0, axis=0)
+    rest[1, 2] = hips_rest
+    skeleton = Skeleton(names, above, rest)
+    places = np.zeros((len(clip), 3, 3))
+    if goes:
+        places[:, 0] = clip.root * [1.0, 0.0, 1.0]
+    back = rotations.about("x", np.array(np.pi / 2))
+    turned, placed = clip.kinematics()
+    rotation = np.insert(clip.rotation, [0, 1], rotations.identity(), axis=1)
+    rotation[:, 0] = rotations.conjugate(back)
+    for joint, like in ((1, 0), (TARGET, old.index("LeftFoot"))):
+        places[:, joint] = rotations.rotate(back, placed[:, like] - places[:, 0])
+        rotation[:, joint] = rotations.multiply(back, turned[:, like])
+    return Clip(skeleton, rotation, places, clip.fps, (0, 1, TARGET), clip.name)
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["stays", "goes"])
+def rigged(request, cmu_walk):  # type: ignore[no-untyped-def]
+    return under_root(cmu_walk, request.param)
+
+
+def test_the_rig_is_the_same_motion(cmu_walk, rigged):
+    own = [j for j in range(len(rigged.skeleton)) if j not in (0, TARGET)]
+    assert np.allclose(rigged.positions()[:, own], cmu_walk.positions(), atol=1e-9)
+    assert hips_of(rigged.skeleton) == 1
+
+
+def test_what_carries_the_motion(cmu_walk):
+    assert carriers(cmu_walk) == [0]
+    assert carriers(under_root(cmu_walk, True)) == [0]
+    assert carriers(under_root(cmu_walk, False)) == [1, TARGET]
+    # Of one pose nobody knows: the root does not move.
+    assert carriers(under_root(cmu_walk, True).slice(5, 6))[0] == 1
+
+
+def test_moving_what_carries_it_moves_the_body_as_one(rigged):
+    turned, placed = rigged.kinematics()
+    yaw = rotations.about("y", np.full(len(rigged), 0.6))
+    there = moved(
+        rigged,
+        {j: (rotations.multiply(yaw, turned[:, j]), turn(placed[:, j], 0.6) + 1.0) for j in carriers(rigged)},
+    )
+    wanted = turn(placed, np.array(0.6)) + 1.0
+    body = slice(1, None)
+    assert np.allclose(there.positions()[:, body], wanted[:, body], atol=1e-9)
+    still = 0 not in carriers(rigged)
+    assert np.allclose(there.positions()[:, 0], placed[:, 0] if still else wanted[:, 0], atol=1e-9)
+
+
+def test_a_path_leads_the_hips(rigged, cmu_walk):
+    gap, middle = (140, 190), 165
+    point = cmu_walk.root[middle, [0, 2]] + [0.4, 0.2]
+    done = interpose.fill(rigged, gap, method="spline", path={middle: point})
+    same = interpose.fill(cmu_walk, gap, method="spline", path={middle: point})
+    hips = done.clip.positions()[:, 1]
+    assert np.linalg.norm(hips[middle, [0, 2]] - point) < 0.01
+    # About as well as without a root above: the finish sees other joints that move.
+    assert np.abs(hips - same.clip.root).max() < 0.03
+    assert done.report.gaps[0].path < 1
+    if 0 not in carriers(rigged):
+        assert np.ptp(done.clip.translation[:, 0], axis=0).max() < 1e-4, "the root stays"
+
+
+def test_lengths_and_courses_go_by_the_hips(rigged, cmu_walk):
+    assert plausible_length(rigged, 20, rigged, 80) == plausible_length(cmu_walk, 20, cmu_walk, 80)
+    lines = [lay([clip.slice(10, 65), clip.slice(140, 200)]) for clip in (rigged, cmu_walk)]
+    assert lines[0].gaps == lines[1].gaps
+    one, other = (line.laid[1].placement for line in lines)
+    assert one.yaw == pytest.approx(other.yaw, abs=1e-6)
+    assert np.allclose(lines[0].clip.positions()[:, 1], lines[1].clip.root, atol=1e-6)
+    if 0 not in carriers(rigged):
+        assert np.ptp(lines[0].clip.translation[:, 0], axis=0).max() < 1e-9
+
+
+def test_hips_whose_place_is_known_rest_nowhere(cmu_walk):
+    """Takes of Bandai-Namco's rig have their first hips as its OFFSET: it says nothing of the body."""
+    one, other = (under_root(cmu_walk.slice(*span), False) for span in ((0, 60), (100, 160)))
+    rest = other.skeleton.rest_translation.copy()
+    rest[1] = [0.7, -0.3, 0.5]
+    other = replace(other, skeleton=replace(other.skeleton, rest_translation=rest))
+    line = lay([one, other])
+    assert line.laid[1].scale == 1
+    assert lay([one, under_root(cmu_walk.slice(100, 160), False)]).laid[1].placement == line.laid[1].placement
+
+
+def test_a_placement_alone_moves_roots(rigged):
+    placement = Placement(0.7, (1.0, 0.0, -2.0))
+    assert np.allclose(placement.of(rigged).positions(), placement.at(rigged.positions()), atol=1e-9)
