@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose import formats
 from interpose.geometry import rotations
 from interpose.observation.broken import broken
+from interpose.skeletons.carrier import hips_of
 
 
 def test_a_snap_to_the_rest_pose_is_found(cmu_walk):
@@ -75,6 +77,19 @@ def test_a_root_that_jumps_or_falls_to_the_origin_is_found(cmu_walk):
     translation[90] += 3
     lost = ~broken(cmu_walk.with_motion(cmu_walk.rotation, translation)).translation
     assert np.argwhere(lost).tolist() == [[50, 0], [90, 0]]
+
+
+@pytest.mark.parametrize(
+    "rig", [lambda clip: clip, lambda clip: under_root(clip, False)], ids=["root", "hips"]
+)
+def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
+    clip = rig(cmu_walk)
+    translation, hips = clip.translation.copy(), hips_of(clip.skeleton)
+    translation[50, hips, 0] += 0.15
+    translation[90:92, hips, 2] -= 0.2
+    translation[130:133, hips, 1] += 0.3
+    lost = ~broken(clip.with_motion(clip.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 
 
 def test_a_long_rest_pose_is_no_snap(cmu_walk):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -52,6 +54,13 @@ def test_a_held_pose_is_one_finding_of_exactly_the_copies(fps):
     found = scan(hold(motion(fps=fps), start, stop, None))
     assert spans(found) == [("frozen", None, start, stop)]
     assert to_gaps(found) == [Gap(start, stop)]
+
+
+@pytest.mark.parametrize("fps", [30, 1 / 0.033333])
+def test_frame_times_that_are_cut_off_ask_for_as_many_frames(fps):
+    """Files write thirtieths of a second with six digits."""
+    found = scan(replace(hold(motion(), 40, 44, [2], value=10), fps=fps))
+    assert spans(found) == [("frozen", ("arm",), 40, 44)]
 
 
 def test_a_held_joint_is_named_and_joints_held_together_are_one_finding():

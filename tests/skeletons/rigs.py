@@ -504,3 +504,30 @@ def _axes(tree: Tree, rig: Rig, place: np.ndarray) -> np.ndarray:
         elif {"LeftArm", "RightArm"} & {tree.canonical[at] for at in tree.above(joint)}:
             axes[joint] = rotations.about("Z", np.array(side * DOWN[rig.rest]))
     return axes
+
+
+TARGET = 2  # of `under_root`: an IK target beside the hips, where the left foot is
+
+
+def under_root(clip: Clip, goes: bool, hips_rest: float = 0.9) -> Clip:
+    """The same motion on a rig whose hips, and a target of the left foot, hang from a root.
+
+    The root is turned as programs with Z up write it. It stays at the origin, or `goes` below the hips.
+    """
+    old = clip.skeleton
+    above = (-1, 0, 0, *(1 if parent == 0 else parent + 2 for parent in old.parents[1:]))
+    names = ("root", old.names[0], "ik_foot_l", *old.names[1:])
+    rest = np.insert(old.rest_translation, [0, 1], 0.0, axis=0)
+    rest[1, 2] = hips_rest
+    skeleton = Skeleton(names, above, rest)
+    places = np.zeros((len(clip), 3, 3))
+    if goes:
+        places[:, 0] = clip.root * [1.0, 0.0, 1.0]
+    back = rotations.about("x", np.array(np.pi / 2))
+    turned, placed = clip.kinematics()
+    rotation = np.insert(clip.rotation, [0, 1], rotations.identity(), axis=1)
+    rotation[:, 0] = rotations.conjugate(back)
+    for joint, like in ((1, 0), (TARGET, old.index("LeftFoot"))):
+        places[:, joint] = rotations.rotate(back, placed[:, like] - places[:, 0])
+        rotation[:, joint] = rotations.multiply(back, turned[:, like])
+    return Clip(skeleton, rotation, places, clip.fps, (0, 1, TARGET), clip.name)

@@ -28,6 +28,7 @@ from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
 from interpose.skeletons import find_mapping
+from interpose.skeletons.carrier import placed
 
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -109,13 +110,10 @@ def denoised(
 
 def _free(clip: Clip, joints: Sequence[int] | None) -> Observation:
     """(F, J) what may be changed: rotations, and translations that carry the body: other bones stay."""
-    skeleton = clip.skeleton
-    hips = find_mapping(skeleton)["Hips"]
-    carriers = {*skeleton.roots, *(() if hips is None else (hips, *skeleton.ancestors(hips)))}
     chosen = np.zeros(clip.rotation.shape[:2], bool)
     chosen[:, slice(None) if joints is None else list(joints)] = True
     moved = np.zeros_like(chosen)
-    moved[:, sorted(carriers & set(clip.translated))] = True
+    moved[:, placed(clip)] = True
     return Observation(chosen, chosen & moved)
 
 

@@ -14,6 +14,7 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.observation import Gap, Observation
 from interpose.skeletons import SIDES, find_mapping
+from interpose.skeletons.carrier import placed
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
 # trembles by 1e-4 and more; files keep about 1e-8.
@@ -70,7 +71,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose, jump or not.
-    - "frozen position": the same for a root whose position stands still while the pose does not.
+    - "frozen position": the same for a root, or hips, whose position stands still while the pose does not.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
 
@@ -108,15 +109,16 @@ def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
 
 
 def _steps(clip: Clip, known: Observation) -> tuple[np.ndarray, np.ndarray]:
-    """Change from frame to frame: turns (F - 1, J), and ways (F - 1, R) of roots; NaN where unknown."""
-    roots = list(clip.skeleton.roots)
+    """Change from frame to frame: turns (F - 1, J), and ways (F - 1, P) of the joints `placed`; NaN where
+    unknown."""
+    placing = placed(clip)
     # The chord of two quaternions: as good as the angle for small ones, and quick on long clips.
     q = rotations.continuous(clip.rotation)
     turned = 2.0 * np.linalg.norm(np.diff(q, axis=0), axis=-1)
-    moved = np.diff(clip.translation[:, [clip.translated.index(root) for root in roots]], axis=0)
+    moved = np.diff(clip.translation[:, [clip.translated.index(joint) for joint in placing]], axis=0)
     moved = np.linalg.norm(moved, axis=-1)
     turned[~(known.rotation[1:] & known.rotation[:-1])] = np.nan
-    position = known.translation[:, roots]
+    position = known.translation[:, placing]
     moved[~(position[1:] & position[:-1])] = np.nan
     return turned, moved
 
@@ -170,7 +172,7 @@ def _runs(zero: np.ndarray, steps: np.ndarray, least: float) -> Iterator[Run]:
 def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> list[Finding]:
     """Frozen runs; the steps are those between the frames `first`, first + 1, ..."""
     names = clip.skeleton.names
-    shortest = max(3, SHORTEST * clip.fps)
+    shortest = max(3, round(SHORTEST * clip.fps))
     with np.errstate(invalid="ignore"):
         still, stopped = turned < STILL, moved < STILL
     alive = np.flatnonzero(np.nansum(turned, axis=0) > LIFELESS)
@@ -210,7 +212,7 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         steps = moved[:, column]
         for run in _runs(stopped[:, column] & ~whole, steps, JUMP_WAY):
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
-                add("frozen position", (names[clip.skeleton.roots[column]],), run)
+                add("frozen position", (names[placed(clip)[column]],), run)
     return found
 
 
@@ -250,5 +252,5 @@ def _suspicious(run: Run, fps: float, pace: float) -> bool:
     """Whether a run of one joint is more than a pause; `pace` is 1 / frames in which it usually moves far."""
     length = run.stop - run.start
     if run.jumps_in or run.jumps_out:
-        return length >= max(3, SHORTEST * fps)
-    return length >= SHORTEST_WITHOUT_JUMP * fps and length * pace >= 1
+        return length >= max(3, round(SHORTEST * fps))
+    return length >= round(SHORTEST_WITHOUT_JUMP * fps) and length * pace >= 1

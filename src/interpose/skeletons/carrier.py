@@ -23,6 +23,12 @@ def hips_of(skeleton: Skeleton) -> int:
     return skeleton.roots[0] if hips is None else hips
 
 
+def placed(clip: Clip) -> list[int]:
+    """The joints whose translations say where the body is: roots, hips and what is between, in order."""
+    hips = hips_of(clip.skeleton)
+    return sorted({*clip.skeleton.roots, hips, *clip.skeleton.ancestors(hips)} & set(clip.translated))
+
+
 def carriers(clip: Clip) -> list[int]:
     """The joints that all of a motion hangs from: to move them is to move the motion.
 
