@@ -33,6 +33,24 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+def test_what_rises_to_its_height_is_motion(cmu_walk):
+    """Toes that push off, at 30 fps: there and back within five frames."""
+    rotation, toes = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftToeBase")
+    bend = np.zeros(len(rotation))
+    for frame in range(20, 190, 25):
+        bend[frame : frame + 5] = [0.15, 0.5, 0.9, 0.4, 0.1]
+    rotation[:, toes] = rotations.about("X", bend)
+    assert broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).complete
+
+
+def test_nothing_is_lost_beside_what_jumps(cmu_walk):
+    """An arm that was frozen is found by `scan`; where it goes on it is not lost."""
+    rotation, arm = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftForeArm")
+    turned = rotations.multiply(rotation[120, arm], rotations.about("X", np.array(0.8)))
+    rotation[80:120, arm] = turned
+    assert broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation[:, arm].all()
+
+
 def test_arms_that_are_taken_for_each_other_are_found(cmu_walk):
     """For half a second: too long for a spike. An arm that swings as fast for as long is none."""
     rotation, names = cmu_walk.rotation.copy(), cmu_walk.skeleton.names

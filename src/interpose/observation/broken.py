@@ -28,6 +28,10 @@ MANY = 5
 # most, by the latter's account.
 SPIKE, SPIKE_WAY, TIMES = 0.35, 0.1, 10.0
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
+# What rises to its height over frames is motion (toes that push off, at 30 fps): beside a spike there is less
+# than this share of it. Of 40 runs of Bandai-Namco 5 toes are taken for lost so, and 52 without it; of 498
+# spikes put into clips of all sets 487 are found instead of 495.
+SLOPE = 0.25
 # What is away for longer than a spike jumps there and back by more than a spike, and so many times as far as
 # it moves in the two frames before the jump and after it; and what it comes back to is where it was, but for
 # this share of the jumps.
@@ -154,11 +158,16 @@ def _spikes(values: np.ndarray, far: float, second: int) -> tuple[np.ndarray, np
     spikes = off > far + TIMES * ndimage.median_filter(off, size=2 * second + 1, mode="nearest")
     steps = _apart(own[1:], own[:-1])
     for start, stop in runs(spikes):
+        height, beside = off[start:stop].max(), np.append(off[start - 1 : start], off[stop : stop + 1])
+        if SLOPE * height < beside.max(initial=0.0):
+            spikes[start:stop] = False
         # Beside what jumps and does not come back the median is of the other side.
-        if 0 < start and stop < len(own):
-            usual = max(steps[start - 2 : start - 1].max(initial=0.0), steps[stop : stop + 1].max(initial=0.0))
+        if start > 0 and stop < len(own):
+            usual = max(
+                steps[start - 2 : start - 1].max(initial=0.0), steps[stop : stop + 1].max(initial=0.0)
+            )
             way = _apart(own[stop], own[start - 1])
-            if way > BACK * off[start:stop].max() + (stop - start + 1) * usual:
+            if way > BACK * height + (stop - start + 1) * usual:
                 spikes[start:stop] = False
     return spikes, middle
 
