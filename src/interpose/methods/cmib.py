@@ -13,7 +13,7 @@ from interpose.errors import unknown
 from interpose.geometry import rotations
 from interpose.geometry.time import sample_rotations_smooth, sample_smooth
 from interpose.methods import weights
-from interpose.methods.bodies import no_humanoid, observed_body
+from interpose.methods.bodies import no_humanoid, observed_body, on_the_floor
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
@@ -112,6 +112,7 @@ class Cmib:
             return f"{at} are more than the {self.card.max_gap} it can fill: give keys inside of them"
         return None
 
+    @on_the_floor
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Rotations of the mapped joints and the way of the hips between keys; a spline for all else."""
         card, body = self.card, observed_body(clip, observation)

@@ -10,6 +10,7 @@ from interpose.clip import Clip
 from interpose.geometry.ground import turn
 from interpose.geometry.time import runs
 from interpose.methods import positional, weights
+from interpose.methods.bodies import on_the_floor
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons import ACROSS, SIDES
@@ -52,6 +53,7 @@ class StmiGan:
             return "it was trained on forecasts and on lost joints, not on gaps between poses"
         return positional.refuses(clip, gap, self.card)
 
+    @on_the_floor
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Positions of the mapped joints at every frame, beside a spline for what positions cannot tell."""
         rng = None if seed is None else np.random.default_rng(seed)
