@@ -399,6 +399,18 @@ def dropped(clip, share):  # type: ignore[no-untyped-def]
     return clip.with_motion(rotation, clip.translation), lost
 
 
+@pytest.mark.parametrize("gap", [(0, 2), (207, 209)])
+def test_auto_takes_the_network_at_any_length_at_the_ends(cmu_walk, gap):
+    """A spline would hold the pose: there is nothing on the other side."""
+    errors = {
+        method: np.linalg.norm(
+            interpose.fill(cmu_walk, gap, method=method).clip.positions() - cmu_walk.positions(), axis=-1
+        )[slice(*gap)].mean()
+        for method in ("auto", "spline")
+    }
+    assert errors["auto"] < 0.8 * errors["spline"]
+
+
 def test_joints_lost_for_moments_are_found_and_interpolated(cmu_walk):
     """At random frames: one line tells of them, the rest comes back bit for bit, and the error is small."""
     noisy, _ = dropped(cmu_walk, 0.3)
