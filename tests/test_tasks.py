@@ -404,7 +404,7 @@ def test_auto_takes_the_network_at_any_length_at_the_ends(cmu_walk, gap):
     """A spline would hold the pose: there is nothing on the other side."""
     errors = {
         method: np.linalg.norm(
-            interpose.fill(cmu_walk, gap, method=method).clip.positions() - cmu_walk.positions(), axis=-1
+            tasks.fill(cmu_walk, [Gap(*gap)], method).clip.positions() - cmu_walk.positions(), axis=-1
         )[slice(*gap)].mean()
         for method in ("auto", "spline")
     }

@@ -14,7 +14,7 @@ GAPS = [Gap(140, 170)]
 
 
 def raised(clip: Clip, by: float) -> Clip:
-    return clip.with_motion(clip.rotation, clip.translation + [0.0, by, 0.0])
+    return clip.with_motion(clip.rotation, clip.translation + np.array([0.0, by, 0.0]))
 
 
 @pytest.mark.parametrize("method", ["small", "cae", "cmib", "stmi-gan"])

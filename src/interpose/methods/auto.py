@@ -27,8 +27,8 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
 
     A network from its length on, unless it refuses: then the next best one. Joints that are missing on their
     own go to networks at any length, as do gaps between two single keys (`lone` is 2), as nothing tells how
-    fast anything moves there, and to AT_ENDS those at an end of the clip. The spline else, and where no weights are installed; then with the reason why
-    no network fills a gap that would be its own.
+    fast anything moves there, and to AT_ENDS those at an end of the clip. The spline else, and where no
+    weights are installed; then with the reason why no network fills a gap that would be its own.
     """
     why, short, at_end = None, False, gap.start == 0 or gap.stop == len(clip)
     for name in KEYS if gap.joints is None and lone == 2 else NETWORKS:
