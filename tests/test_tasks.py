@@ -399,9 +399,10 @@ def dropped(clip, share):  # type: ignore[no-untyped-def]
     return clip.with_motion(rotation, clip.translation), lost
 
 
-@pytest.mark.parametrize("gap", [(0, 2), (207, 209)])
+@pytest.mark.parametrize("gap", [(0, 2), (138, 140)])
 def test_auto_takes_the_network_at_any_length_at_the_ends(cmu_walk, gap):
-    """A spline would hold the pose: there is nothing on the other side."""
+    """A spline has nothing on the other side."""
+    cmu_walk = cmu_walk.slice(60, 200)
     errors = {
         method: np.linalg.norm(
             tasks.fill(cmu_walk, [Gap(*gap)], method).clip.positions() - cmu_walk.positions(), axis=-1
