@@ -164,6 +164,14 @@ def test_a_lost_joint_does_not_keep_the_network_from_a_gap(long_walk):
     assert job.method is not None, "a limit of 40 frames is meant for the gap of the whole pose"
 
 
+@pytest.mark.parametrize("whole", [(100, 102), (120, 130), (60, 80), (100, 120)])
+def test_a_pose_that_is_lost_beside_a_lost_arm_keeps_the_network(cmu_walk, whole):
+    """Neither is the gap too short for it, nor is the hand, lost on both sides, at a seam there."""
+    done = tasks.fill(cmu_walk, [Gap(80, 120, ("LeftArm", "LeftForeArm", "LeftHand")), Gap(*whole)])
+    assert {gap.method for gap in done.report.gaps} == {"small"}
+    assert not any(gap.notes for gap in done.report.gaps)
+
+
 def test_auto_says_why_the_network_does_not_fill_a_long_gap(cmu_walk):
     report = tasks.fill(cmu_walk, [Gap(40, 165)], "auto").report.gaps[0]
     assert report.method == "spline"

@@ -533,6 +533,9 @@ def plan(
             name = "cmib"
         if name == "auto":
             chosen, note = auto.choose(clip, lead, _lone(observation, gap))
+            if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
+                # Too short for a network alone, amid joints that are lost for longer.
+                chosen, note = auto.choose(clip, parted)
         else:
             chosen = registry.told(name, action, temperature)
         if open_ and (pins := observation.slice(gap.start, gap.stop).pins):
@@ -571,6 +574,14 @@ def _lead(observation: Observation, gap: Gap) -> Gap:
     empty = runs(np.logical_not(observation.rotation[gap.start : gap.stop].any(axis=1)))
     start, stop = max(empty, key=lambda run: run[1] - run[0])
     return Gap(gap.start + start, gap.start + stop)
+
+
+def _parted(observation: Observation, clip: Clip, gap: Gap) -> Gap | None:
+    """The joints that are lost in the frames of a gap in which others are known."""
+    part = observation.slice(gap.start, gap.stop)
+    lost = ~(part.rotation & part.translation) & part.rotation.any(axis=1, keepdims=True)
+    names = tuple(clip.skeleton.names[joint] for joint in np.flatnonzero(lost.any(axis=0)))
+    return Gap(gap.start, gap.stop, names) if names else None
 
 
 class _Piece(NamedTuple):

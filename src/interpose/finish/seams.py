@@ -146,8 +146,9 @@ def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
 
 
 def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
-    """As `jumps`, of the joints alone that hang from a value that is known there and missing beside it: what
-    another one does that is missing all the while, as a foot that lands, is no seam of theirs."""
+    """As `jumps`, of the joints alone whose seam it is: those that hang from a value that is known there and
+    missing beside it, and whose own place is known there. What another one does that is missing all the while,
+    as a foot that lands, is no seam of theirs, nor is what a lost hand does where the body is lost, too."""
     columns = list(motion.translated)
     ends = [now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation)]
     turned, moved = ends[0], np.zeros_like(ends[1])
@@ -155,7 +156,8 @@ def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     for joint, parent in enumerate(motion.skeleton.parents):
         if parent >= 0:
             moved[:, joint] |= moved[:, parent] | turned[:, parent]
-    return np.where(moved[..., None], jumps(motion, known, at), 0.0)
+    placed = Observation(known.rotation[at], known.translation[at]).positions(motion.skeleton)
+    return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
 
 
 def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
