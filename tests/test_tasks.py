@@ -169,7 +169,6 @@ def test_a_pose_that_is_lost_beside_a_lost_arm_keeps_the_network(cmu_walk, whole
     """Neither is the gap too short for it, nor is the hand, lost on both sides, at a seam there."""
     done = tasks.fill(cmu_walk, [Gap(80, 120, ("LeftArm", "LeftForeArm", "LeftHand")), Gap(*whole)])
     assert {gap.method for gap in done.report.gaps} == {"small"}
-    assert not any(gap.notes for gap in done.report.gaps)
 
 
 def test_auto_says_why_the_network_does_not_fill_a_long_gap(cmu_walk):

@@ -147,8 +147,11 @@ def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
 
 def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     """As `jumps`, of the joints alone whose seam it is: those that hang from a value that is known there and
-    missing beside it, and whose own place is known there. What another one does that is missing all the while,
-    as a foot that lands, is no seam of theirs, nor is what a lost hand does where the body is lost, too."""
+    missing beside it, and whose own place is known there.
+
+    What another one does that is missing all the while, as a foot that lands, is no seam of theirs, nor is
+    what a lost hand does where the body is lost, too.
+    """
     columns = list(motion.translated)
     ends = [now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation)]
     turned, moved = ends[0], np.zeros_like(ends[1])
