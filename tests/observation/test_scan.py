@@ -125,6 +125,16 @@ def test_a_joint_that_is_still_but_for_one_step_is_no_finding(step):
     assert spans(scan(hold(stepped, 40, 60, [2]))) == [("frozen", ("arm",), 40, 60)]
 
 
+def test_a_joint_that_rest_poses_alone_turn_is_no_finding():
+    """Toes of LAFAN1 never turn; frames of a rest pose amid the motion do not make them frozen."""
+    clip = motion()
+    rotation = clip.rotation.copy()
+    rotation[:, 4] = rotations.about("x", np.array(0.3))
+    rotation[[30, 31, 70, 71, 90]] = [1.0, 0, 0, 0]
+    found = scan(clip.with_motion(rotation, clip.translation))
+    assert not any("finger" in (one.joints or ()) for one in found if one.kind == "frozen")
+
+
 def test_a_duplicated_frame_is_no_finding():
     assert scan(hold(motion(), 60, 61, None)) == []
 

@@ -23,6 +23,8 @@ STILL = 1e-6
 LIFELESS = 1e-3
 # A joint whose like on the other side turns this much in the whole clip (radians) has data, too, or had.
 LIVELY = 1.0
+# A joint that stands still in more than this share of all steps has no data either: rest poses turn it.
+IDLE = 0.9
 # Frozen runs shorter than this many seconds are as good as noise; at least 3 frames.
 SHORTEST = 0.1
 # A joint that stands still without a jump at either end may be at the limit of a hinge: only after a second.
@@ -76,7 +78,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       to three frames: what `recover` restores.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
-    those that stand still for half of the clip at a stretch: they have no data to be filled from.
+    those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
+    data to be filled from.
     """
     findings: list[Finding] = []
     known = observation or Observation.full(clip)
@@ -199,7 +202,8 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     for joint in alive.tolist():
         steps = turned[:, joint]
         pauses = list(_runs(still[:, joint] & ~whole, steps, JUMP_TURN))
-        if any(2 * (run.stop - run.start) >= len(steps) for run in pauses):
+        longest = max((run.stop - run.start for run in pauses), default=0)
+        if 2 * longest >= len(steps) or still[:, joint].mean() > IDLE:
             continue  # no data but for some steps, like the fingers of many files
         for run in pauses:
             value = clip.rotation[first + run.start, joint]
