@@ -687,7 +687,10 @@ def _joined(reports: list[GapReport]) -> list[GapReport]:
         }
         means = {
             name: _over(last, one, name, lambda a, b, share=share: a + share * (b - a))
-            for name in ("solve_error", "foot_slide", "foot_slide_before", "liveliness", "expected")
+            for name in (
+                *("solve_error", "foot_slide", "foot_slide_before"),
+                *("liveliness", "gliding", "expected"),
+            )
         }
         travel = _over(last, one, "foot_travel", lambda a, b: a + b)
         notes = tuple(dict.fromkeys(last.notes + one.notes))

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interpose.finish import complete, measures
+from interpose import tasks
+from interpose.finish import complete, feet, measures, notes
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn
 from interpose.methods import registry
 from interpose.observation import Gap, Observation
 
@@ -38,3 +41,54 @@ def test_the_report_says_that_a_gap_is_a_mean_pose(cmu_walk):
     (report,) = complete(cmu_walk, seen, registry.get("cae")).report.gaps
     assert report.liveliness > 0.33
     assert not any("A key near" in note for note in report.notes)
+
+
+def test_what_follows_is_compared_with_what_was_before(cmu_walk):
+    positions = cmu_walk.positions()
+    assert 0.7 < measures.liveliness(positions[:135], 75, 135, 30.0) < 1.4
+    held = np.concatenate([positions[:75], np.repeat(positions[74:75], 60, axis=0)])
+    assert measures.liveliness(held, 75, 135, 30.0) < 1e-9
+    assert measures.liveliness(held[::-1], 0, 60, 30.0) < 1e-9
+    done = tasks.forecast(cmu_walk.slice(0, 75), 60, method="zero-velocity")
+    (report,) = done.report.gaps
+    assert any("as much as the motion before it" in note for note in report.notes)
+
+
+def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk):
+    """Between poses in which it faces the same way a straight line floats, and slides less than people do."""
+    said = {}
+    for method in ("linear", "small"):
+        (said[method],) = tasks.fill(cmu_walk, [Gap(10, 60)], method).report.gaps
+    assert said["linear"].gliding > 0.5
+    assert said["small"].gliding < 0.1
+    glides = {m: any("it glides" in note for note in gap.notes) for m, gap in said.items()}
+    assert glides == {"linear": True, "small": False}
+
+
+def test_gliding_does_not_depend_on_the_place_nor_on_the_size(cmu_walk):
+    pairs = feet.pairs(cmu_walk.skeleton)
+    positions = cmu_walk.positions()
+    positions[60:100] = positions[59] + np.linspace(0.0, 1.5, 40)[:, None, None] * [0.6, 0.0, 0.8]
+    found = measures.glides(positions[:, pairs], positions[:, 0], 30.0)
+    assert found[61:99].all()
+    large = 2 * turn(positions, np.array(0.7)) + [5.0, 1.0, 2.0]
+    assert np.array_equal(measures.glides(large[:, pairs], large[:, 0], 30.0, 2.0), found)
+
+
+def test_a_hand_under_the_floor_is_said(cmu_walk):
+    """Of a body that lies: feet tell nothing of it."""
+    down = rotations.about("X", np.array(np.pi / 2))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(down, np.broadcast_to(rotation[60, 0], rotation[:, 0].shape))
+    lying = cmu_walk.with_motion(rotation, np.zeros_like(cmu_walk.translation))
+    seen, gap = Observation.from_gaps(lying, [Gap(80, 110)]), Gap(80, 110)
+    assert notes.sunk(lying, seen, gap, 0) == []
+    arm = cmu_walk.skeleton.index("LeftArm")
+    turned = lying.kinematics()[0][80:110, lying.skeleton.parents[arm]]
+    hand = lying.positions()[80:110, cmu_walk.skeleton.index("LeftHand")] - lying.positions()[80:110, arm]
+    under = rotations.between(hand, np.broadcast_to([0.0, -1.0, 0.0], hand.shape))
+    local = rotations.multiply(rotations.conjugate(turned), rotations.multiply(under, turned))
+    rotation[80:110, arm] = rotations.multiply(local, rotation[80:110, arm])
+    (note,) = notes.sunk(lying.with_motion(rotation, lying.translation), seen, gap, 100)
+    assert "LeftHand" in note
+    assert "under the floor at frame 2" in note  # counted from 100

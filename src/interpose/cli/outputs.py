@@ -31,6 +31,7 @@ UNITS = {
     "foot_travel": "m",
     "penetration": "cm",
     "liveliness": "share of the motion around",
+    "gliding": "share of the frames",
     "path": "cm",
     "pins": "cm",
     "drift": "cm",

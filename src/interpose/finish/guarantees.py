@@ -14,7 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, measures, penetration, pins, seams
+from interpose.finish import feet, measures, notes, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
@@ -29,19 +29,8 @@ from interpose.observation import Gap, Observation, Pin
 
 # Positions further out than this (metres) are as good as no numbers.
 NOWHERE = 1e4
-# A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
-# pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
-DULL = 0.33
-# Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
-# gaps of a second.
-DOUBT = 0.15
-# Seconds that should be known on either side of a gap for a network to fill it well. Errors of validation
-# performers are then within 6 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
-BESIDE = 0.1
 # A share of all joints: so many laid on a body are most of it.
 MOST = 0.5
-# Metres below the floor at which a foot is asked about.
-SUNK = 0.05
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
 # A path on which the hips go this much further than without it is said to be too long.
@@ -215,7 +204,7 @@ def complete(
             # has only the rest pose to say.
             excess, other = (_excess(clip, known, span, bounds, first)[0] for clip in (own, current))
             blank = isinstance(fallback, Spline) and any(
-                _never(known, gap, clip.skeleton.names) for gap in gaps if _of(spans, gap) is span
+                notes.never(known, gap, clip.skeleton.names) for gap in gaps if _of(spans, gap) is span
             )
             if not span.hopeless and (blank or other > max(1.0, LESS * excess)):
                 _write(current, own, span.start, (span.start, span.stop))
@@ -683,10 +672,10 @@ def _report(
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
     after = _jump(finished, known, _at(gap), seams.seam_jumps)
-    alive = None if gap.joints is not None else _liveliness(finished, gap)
+    alive = None if gap.joints is not None else notes.liveliness(finished, gap)
+    glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
-    scant = _scant(known, gap, finished.fps) if networks else None
-    never = [] if own and "model" in raw.notes else _never(known, gap, skeleton.names)
+    never = [] if own and "model" in raw.notes else notes.never(known, gap, skeleton.names)
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
     # It speaks of all joints: where most of them are known it would mislead.
     risk = raw.expected[gap.start : gap.stop] if raw.expected is not None else None
@@ -711,89 +700,20 @@ def _report(
         foot_travel=held[1] if held else None,
         penetration=_centi(inside[0] if inside else None),
         liveliness=alive,
+        gliding=glide[0] if glide else None,
         drift=_centi(_drift(raw.notes, gap)) if own else None,
         expected=_centi(float(np.mean(risk))) if risk is not None else None,
         notes=(
             *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),
-            *_sunk(finished, known, gap, first),
-            *((_dull(alive, gap, first),) if alive is not None and alive < DULL else ()),
-            *(
-                (_doubtful(risk, gap, first, gap.stop == len(finished)),)
-                if risk is not None and risk.mean() > DOUBT
-                else ()
-            ),
-            *((scant,) if scant else ()),
-            *((_rests(never, span.method),) if never else ()),
+            *notes.sunk(finished, known, gap, first),
+            *notes.dull(alive, gap, first, ahead),
+            *notes.adrift(glide),
+            *notes.doubtful(risk, gap, first, ahead),
+            *(notes.scant(known, gap, finished.fps) if networks else ()),
+            *notes.rests(never, span.method),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
-    )
-
-
-def _sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
-    """A note where a foot goes through the floor."""
-    near = round(feet.NEARBY * finished.fps)
-    lo, hi = max(gap.start - near, 0), min(gap.stop + near, len(finished))
-    found = feet.sunk(finished.slice(lo, hi), known.slice(lo, hi), gap.start - lo, gap.stop - lo)
-    if found is None or found[0] < SUNK * feet.size(finished.skeleton):
-        return []
-    depth, joint, frame = found
-    name = finished.skeleton.names[joint]
-    return [f"flagged: {name} is {100 * depth:.0f} cm under the floor at frame {first + lo + frame}"]
-
-
-def _liveliness(finished: Clip, gap: Gap) -> float | None:
-    second = round(finished.fps)
-    lo, hi = max(0, gap.start - second), min(len(finished), gap.stop + second)
-    return measures.liveliness(
-        finished.slice(lo, hi).positions(), gap.start - lo, gap.stop - lo, finished.fps
-    )
-
-
-def _dull(alive: float, gap: Gap, first: int) -> str:
-    return (
-        f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
-        f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
-    )
-
-
-def _doubtful(risk: np.ndarray, gap: Gap, first: int, ahead: bool) -> str:
-    off = f"{100 * risk.mean():.0f} cm"
-    said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
-    # Whoever asks for what comes next has no key to give.
-    return said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps most"
-
-
-def _never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:
-    """The joints of a gap of which nothing is known at any frame."""
-    return [name for name in gap.joints or () if not known.rotation[:, names.index(name)].any()]
-
-
-def _rests(never: list[str], method: str) -> str:
-    named = ", ".join(never[:4]) + f" +{len(never) - 4}" * (len(never) > 4)
-    return (
-        f"flagged: nothing of {named} is known at any frame, and {method} has only the rest pose to say. "
-        "--method cae tells it from the other joints"
-    )
-
-
-def _scant(known: Observation, gap: Gap, fps: float) -> str | None:
-    """What to say of a gap of the whole pose beside which too little is known for a network.
-
-    Nothing where a side has a single frame, which is a key, or none at all; nor of short gaps.
-    """
-    # Of most joints: a joint that is missing all the time, or a part laid into a gap, makes no difference.
-    holes = [(0, 0), *runs(known.rotation.mean(axis=1) < 0.5), (len(known.rotation),) * 2]
-    at = next(i for i, (start, stop) in enumerate(holes) if start <= gap.start < stop)
-    before, after = holes[at][0] - holes[at - 1][1], holes[at + 1][0] - holes[at][1]
-    length = holes[at][1] - holes[at][0]
-    enough = math.ceil(BESIDE * fps)
-    if length <= enough or not 2 <= min(before, after) < enough:
-        return None
-    few = [f"{n} frames {side} it" for n, side in ((before, "before"), (after, "after")) if n < enough]
-    return (
-        f"only {' and '.join(few)} are known, and a gap of {length} needs {enough} on either side to be "
-        "filled well: leave more around it, or give a key inside of it"
     )
 
 

@@ -8,6 +8,8 @@ import numpy as np
 SLIDE_HEIGHT = 0.025
 # Metres a second that joints move on average against the root of a body that is not still.
 STIRS = 0.15
+# Metres a second, and a share of what the hips do, above which a foot goes along with a body that glides.
+GLIDE, ALONG = 0.3, 0.5
 
 
 def joint_error(positions: np.ndarray, truth: np.ndarray) -> float:
@@ -63,7 +65,8 @@ def liveliness(positions: np.ndarray, start: int, stop: int, fps: float) -> floa
 
     The mean speed of joints relative to the first one, over the second before frame `start` and the second
     from `stop` on. Long gaps of methods that say one answer tend to the mean of all possible ones, which
-    hardly moves (Kaufmann et al. 2020, section 4.2).
+    hardly moves (Kaufmann et al. 2020, section 4.2). Of a gap at an end of the motion it is all but the
+    quarter beside what is known, whose second alone it is compared with.
 
     Args:
         positions: (F, J, 3) metres, the root first.
@@ -72,15 +75,16 @@ def liveliness(positions: np.ndarray, start: int, stop: int, fps: float) -> floa
     Returns:
         None for gaps under a second, with less than half a second of motion on a side, or amid stillness.
     """
-    second = round(fps)
+    second, quarter = round(fps), (stop - start) // 4
     lo, hi = max(0, start - second), min(len(positions), stop + second)
-    if stop - start < second or min(start - lo, hi - stop) < second / 2:
+    sides = [side for side in ((lo, start), (stop, hi)) if side[0] < side[1]]
+    if stop - start < second or not sides or min(b - a for a, b in sides) < second / 2:
         return None
-    around = [_stir(positions[lo:start]), _stir(positions[stop:hi])]
-    if np.mean(around) * fps < STIRS:
+    around = float(np.mean([_stir(positions[a:b]) for a, b in sides]))
+    if around * fps < STIRS:
         return None
-    quarter = (stop - start) // 4
-    return float(_stir(positions[start + quarter : stop - quarter]) / np.mean(around))
+    middle = positions[start + quarter * (start > 0) : stop - quarter * (stop < len(positions))]
+    return float(_stir(middle) / around)
 
 
 def _stir(positions: np.ndarray) -> float:
@@ -116,6 +120,21 @@ def foot_travel(positions: np.ndarray) -> float:
     if len(positions) < 2:
         return 0.0
     return float(np.linalg.norm(np.diff(positions, axis=0), axis=-1).sum(axis=0).mean())
+
+
+def glides(feet: np.ndarray, root: np.ndarray, fps: float, size: float = 1.0) -> np.ndarray:
+    """(F,) in which frames a body travels on no foot: each goes along with it, ankle and toe.
+
+    What `foot_slide` does not see, as it looks at feet on the floor alone: a method whose feet float slides
+    least. Who runs or jumps is in the air for moments, too, so shares are to be compared.
+
+    Args:
+        feet: (F, L, n, 3) metres, ankles and toes of L legs.
+        root: (F, 3) metres, the hips.
+        size: of the body, 1 for a leg of the usual length.
+    """
+    slowest = speed(feet, fps).min(axis=2).min(axis=1)
+    return (slowest > GLIDE * size) & (slowest > ALONG * speed(root, fps))
 
 
 def stance_speed(positions: np.ndarray, planted: np.ndarray, fps: float) -> float:

@@ -48,6 +48,8 @@ class GapReport:
         penetration: cm, how deep the body goes into itself; a note says where if that is out of the ordinary.
         liveliness: how much the body moves in the middle of the gap, as a share of how much around it; a note
             says so where it hardly moves.
+        gliding: the share of its frames in which the body travels and no foot stands; a note says so where
+            that is far more often than around it.
         path: cm, by how much the hips miss points of the path that was asked for.
         pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
@@ -73,6 +75,7 @@ class GapReport:
     foot_travel: float | None = None
     penetration: float | None = None
     liveliness: float | None = None
+    gliding: float | None = None
     path: float | None = None
     pins: float | None = None
     drift: float | None = None

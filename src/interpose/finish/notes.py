@@ -1,0 +1,155 @@
+"""What a report says of a gap beside its figures: what a person should look at, and what would help."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.finish import feet, measures
+from interpose.geometry.time import runs
+from interpose.observation import Gap, Observation
+from interpose.skeletons import find_mapping
+from interpose.skeletons.carrier import hips_of
+
+# A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
+# pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
+DULL = 0.33
+# A gap in whose frames a body glides this much more often than around it is said to: of 39 pieces of 2 s of
+# validation performers' real motion none does; of fills by `linear` 15, `spline` 14, `cmib` 5, `cae` 3 do,
+# and by `small` none. Who runs is in the air for a third of the time.
+GLIDES, AIRBORNE = 0.25, 0.35
+# Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
+# gaps of a second.
+DOUBT = 0.15
+# Seconds that should be known on either side of a gap for a network to fill it well. Errors of validation
+# performers are then within 6 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
+BESIDE = 0.1
+# Metres below the floor at which a foot, or another joint, is asked about.
+SUNK = 0.05
+
+
+def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """A note where a foot goes through the floor, or else what is lower than all that is known nearby."""
+    near, skeleton = round(feet.NEARBY * finished.fps), finished.skeleton
+    lo, hi = max(gap.start - near, 0), min(gap.stop + near, len(finished))
+    part, seen = finished.slice(lo, hi), known.slice(lo, hi)
+    found = [feet.sunk(part, seen, gap.start - lo, gap.stop - lo), _deepest(part, seen, gap.start - lo, gap)]
+    for depth, joint, frame in filter(None, found):
+        if depth >= SUNK * feet.size(skeleton):
+            where = f"{100 * depth:.0f} cm under the floor at frame {first + lo + frame}"
+            return [f"flagged: {skeleton.names[joint]} is {where}"]
+    return []
+
+
+def _deepest(part: Clip, seen: Observation, start: int, gap: Gap) -> tuple[float, int, int] | None:
+    """By how many metres the lowest joint of a gap that begins at frame `start` is below the lowest that is
+    observed, which joint, and at which frame; None without any. What a foot does `feet.sunk` tells."""
+    heights, observed = part.positions()[..., 1], seen.positions(part.skeleton)
+    joints = [j for j in find_mapping(part.skeleton).mapped[1] if j not in feet.ends(part.skeleton)]
+    free = np.where(observed, np.inf, heights)[start : start + len(gap), joints]
+    if not observed.any() or not np.isfinite(free).any():
+        return None
+    frame, joint = np.unravel_index(int(free.argmin()), free.shape)
+    return float(heights[observed].min() - free[frame, joint]), joints[joint], start + int(frame)
+
+
+def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float] | None:
+    """The share of a gap's frames in which the body travels and no foot stands, and that of known frames
+    around it; None for what is too short, or has no two legs."""
+    fps, skeleton = finished.fps, finished.skeleton
+    near = round(feet.NEARBY * fps)
+    lo, hi = max(0, gap.start - near), min(len(finished), gap.stop + near)
+    pairs, hips = feet.pairs(skeleton), hips_of(skeleton)
+    if len(pairs) < 2 or gap.stop - gap.start < fps / 2:
+        return None
+    placed, seen = finished.slice(lo, hi).positions(), known.slice(lo, hi).positions(skeleton)
+    found = measures.glides(placed[:, pairs], placed[:, hips], fps, feet.size(skeleton))
+    around = seen[:, [*pairs.ravel(), hips]].all(axis=1)
+    # Between lone keys nothing tells whether it runs, and who runs is in the air for a third of the time.
+    usual = found[around].mean() if around.sum() >= fps / 2 else AIRBORNE
+    return float(found[gap.start - lo : gap.stop - lo].mean()), float(usual)
+
+
+def adrift(glide: tuple[float, float] | None) -> list[str]:
+    """A note where a body glides: `glide` as from `gliding`."""
+    if glide is None or glide[0] - glide[1] <= GLIDES:
+        return []
+    share, usual = glide
+    return [
+        f"flagged: it glides: in {100 * share:.0f} % of its frames the body travels and no foot stands "
+        f"(around it in {100 * usual:.0f} %)"
+    ]
+
+
+def liveliness(finished: Clip, gap: Gap) -> float | None:
+    """`measures.liveliness` of a gap."""
+    second = round(finished.fps)
+    lo, hi = max(0, gap.start - second), min(len(finished), gap.stop + second)
+    return measures.liveliness(
+        finished.slice(lo, hi).positions(), gap.start - lo, gap.stop - lo, finished.fps
+    )
+
+
+def dull(alive: float | None, gap: Gap, first: int, ahead: bool) -> list[str]:
+    """A note where a body hardly moves: `alive` as from `liveliness`. What is `ahead` has no end to key."""
+    if alive is None or alive >= DULL:
+        return []
+    if ahead:
+        return [
+            f"flagged: most of it moves {100 * alive:.0f} % as much as the motion before it: a mean of many "
+            "possible motions. --method stmi-gan keeps moving"
+        ]
+    return [
+        f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
+        f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
+    ]
+
+
+def doubtful(risk: np.ndarray | None, gap: Gap, first: int, ahead: bool) -> list[str]:
+    """A note where joints are expected to be far off: `risk` is metres by frame of the gap."""
+    if risk is None or risk.mean() <= DOUBT:
+        return []
+    off = f"{100 * risk.mean():.0f} cm"
+    said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
+    # Whoever asks for what comes next has no key to give.
+    return [
+        said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps most"
+    ]
+
+
+def never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:
+    """The joints of a gap of which nothing is known at any frame."""
+    return [name for name in gap.joints or () if not known.rotation[:, names.index(name)].any()]
+
+
+def rests(joints: list[str], method: str) -> list[str]:
+    """A note where nothing of some joints is `never` known."""
+    if not joints:
+        return []
+    named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
+    return [
+        f"flagged: nothing of {named} is known at any frame, and {method} has only the rest pose to say. "
+        "--method cae tells it from the other joints"
+    ]
+
+
+def scant(known: Observation, gap: Gap, fps: float) -> list[str]:
+    """A note of a gap of the whole pose beside which too little is known for a network.
+
+    Nothing where a side has a single frame, which is a key, or none at all; nor of short gaps.
+    """
+    # Of most joints: a joint that is missing all the time, or a part laid into a gap, makes no difference.
+    holes = [(0, 0), *runs(known.rotation.mean(axis=1) < 0.5), (len(known.rotation),) * 2]
+    at = next(i for i, (start, stop) in enumerate(holes) if start <= gap.start < stop)
+    before, after = holes[at][0] - holes[at - 1][1], holes[at + 1][0] - holes[at][1]
+    length = holes[at][1] - holes[at][0]
+    enough = math.ceil(BESIDE * fps)
+    if length <= enough or not 2 <= min(before, after) < enough:
+        return []
+    few = [f"{n} frames {side} it" for n, side in ((before, "before"), (after, "after")) if n < enough]
+    return [
+        f"only {' and '.join(few)} are known, and a gap of {length} needs {enough} on either side to be "
+        "filled well: leave more around it, or give a key inside of it"
+    ]
