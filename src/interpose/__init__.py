@@ -266,7 +266,7 @@ def between(
         clip: a clip, or the path of one. Its poses between the keys have no influence; what lies before the
             first and after the last key stays as it is.
         keys: frame numbers, two or more.
-        action: what the motion is ("walk", "jumps", ...): asks for the method "cmib".
+        action: what the motion is ("walk", ...): asks for "cmib" beside lone keys, for "small" elsewhere.
         method, seed, progress: as in `fill`.
 
     Returns and raises what `fill` does; RequestError also for keys with nothing between them and for an
@@ -333,7 +333,7 @@ def stitch(
             `clip.slice(12, 80)` is a part of one.
         frames: how many frames to generate: one number, or one for each gap; "auto" chooses what is
             unhurried.
-        action: what the motion in the gaps is ("walk", ...): asks for the method "cmib".
+        action: what the motion in the gaps is ("walk", ...), for methods that know actions.
         align: each following clip heads on where the one before it was heading, as far ahead as their paces
             lead. Without it clips stay where they lie.
         loop: one more gap leads back to the beginning, so that the motion can be played round and round.

@@ -82,7 +82,8 @@ def fill(
         seed: for methods that sample.
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
-        action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib".
+        action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib" beside
+            lone keys, and "small" amid motion.
         parts: poses of single joints that other clips give inside of the gaps.
         path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
@@ -530,8 +531,8 @@ def plan(
         open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
         name, note = methods.get(number, method), None
         if name == "auto" and action:
-            name = "cmib"
-        if name == "auto":
+            chosen = auto.choose_told(clip, lead, _lone(observation, gap), action)
+        elif name == "auto":
             chosen, note = auto.choose(clip, lead, _lone(observation, gap))
             if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
                 # Too short for a network alone, amid joints that are lost for longer.

@@ -58,7 +58,8 @@ def between(
             the last anchor on).
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
-        action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib.
+        action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib, or
+            small where motion is known on both sides.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
