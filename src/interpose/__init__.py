@@ -183,15 +183,18 @@ def recover(
     method: str = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    place: bool = False,
 ) -> Completion:
     """Recover joints whose local rotations are unknown, over the whole clip or in a range of frames.
 
     Args:
         clip: a clip, or the path of one.
         joints: names; one name may stand alone. Without any, what was lost is found: joints that snap to
-            their rest pose and spikes, at any frames.
+            their rest pose and spikes, at any frames, and hips that stand still while they turn.
         frames: "120:160" or (120, 160); None for all.
         method, seed, progress: as in `fill`.
+        place: where the body is, is lost, and how it is turned is known: feet that stand tell it. Of a whole
+            clip the first frame counts.
 
     Returns and raises what `fill` does.
     """
@@ -205,6 +208,7 @@ def recover(
         method=method,
         seed=seed,
         progress=progress,
+        place=place,
     )
 
 

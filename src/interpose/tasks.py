@@ -30,8 +30,9 @@ from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken
 from interpose.observation.part import lay
-from interpose.observation.scan import strays
+from interpose.observation.scan import strays, stuck
 from interpose.skeletons import find_humanoid
+from interpose.skeletons.carrier import placed as placing
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
@@ -223,18 +224,34 @@ def recover(
     method: str = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    place: bool = False,
 ) -> Completion:
     """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
 
     Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose or
     jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
-    whole: that `scan` finds, and `fill` mends. Other arguments, result and errors are those of `fill`.
+    whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn. `place`
+    says that this is all that is lost: where the body is, but for the first frame of a whole clip. Feet that
+    stand tell it. Other arguments, result and errors are those of `fill`.
     """
     start, stop = frames or (0, len(clip))
+    if frames is not None:
+        Gap(start, stop).check(len(clip))
+    if place:
+        if joints is not None:
+            raise RequestError(
+                "joints and the place of the body cannot be recovered at once",
+                "feet tell the place only where all turns are known",
+                "Recover the joints first, and then the place.",
+            )
+        seen = Observation.full(clip)
+        seen.translation[start + (start == 0 and stop == len(clip)) : stop, placing(clip)[-1:]] = False
+        return fill(clip, seen, method, seed=seed, progress=progress)
     if joints is None:
-        if frames is not None:
-            Gap(start, stop).check(len(clip))
         seen = broken(clip)
+        for one in stuck(clip):
+            held = [clip.skeleton.index(name) for name in one.joints or ()]
+            seen.translation[one.start : one.stop, held] = False
         outside = np.ones(len(clip), bool)
         outside[start:stop] = False
         outside[strays(clip)] = True
@@ -533,10 +550,7 @@ def plan(
         if name == "auto" and action:
             chosen = auto.choose_told(clip, lead, _lone(observation, gap), action)
         elif name == "auto":
-            chosen, note = auto.choose(clip, lead, _lone(observation, gap))
-            if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
-                # Too short for a network alone, amid joints that are lost for longer.
-                chosen, note = auto.choose(clip, parted)
+            chosen, note = _suited(clip, observation, gap, lead)
         else:
             chosen = registry.told(name, action, temperature)
         if open_ and (pins := observation.slice(gap.start, gap.stop).pins):
@@ -547,6 +561,18 @@ def plan(
             )
         jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
+
+
+def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[Method, str | None]:
+    """The method that `auto` takes for a gap, and why no network, where one would be its own."""
+    if observation.rotation[gap.start : gap.stop].all():
+        # What the body stands on tells more of where it is than any method.
+        return Spline(), None
+    chosen, note = auto.choose(clip, lead, _lone(observation, gap))
+    if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
+        # Too short for a network alone, amid joints that are lost for longer.
+        return auto.choose(clip, parted)
+    return chosen, note
 
 
 def _span(observation: Observation, clip: Clip, start: int, stop: int) -> Gap:
@@ -628,9 +654,12 @@ def _together(jobs: Sequence[Job], clip: Clip, observation: Observation) -> list
 def _pieces(clip: Clip, observation: Observation, gap: Gap) -> Iterator[tuple[int, int]]:
     """The gap itself; or, when single joints are missing for long, overlapping pieces of it.
 
-    Where pieces overlap at least a part of every pose is known.
+    Where pieces overlap at least a part of every pose is known. Where all turns are, the way of the body goes
+    on from its beginning, and pieces of it would be apart.
     """
     piece, overlap = round(PIECE * clip.fps), round(OVERLAP * clip.fps)
+    if observation.rotation[gap.start : gap.stop].all():
+        piece = len(gap)
     empty = np.logical_not(observation.rotation.any(axis=1))
     start = gap.start
     while True:

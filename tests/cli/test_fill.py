@@ -255,6 +255,22 @@ def test_recover_without_joints_finds_what_was_lost_for_moments(run, take):
     assert abs(off).max() < 0.02
 
 
+def test_the_place_of_a_body_is_recovered_by_name_and_where_it_stands_still(run, take):
+    clip = load(take)
+    translation = clip.translation.copy()
+    translation[60:120] = translation[59]
+    save(clip.with_motion(clip.rotation, translation), Path("stuck.bvh"))
+    assert "interpose recover stuck.bvh" in run("scan", "stuck.bvh").out
+    assert "`interpose recover` restores" in run("fill", "stuck.bvh").err
+    done = run("recover", "stuck.bvh")
+    assert "what the body stands on tells where it is" in done.out
+    assert np.linalg.norm(load(Path("stuck.recovered.bvh")).root - clip.root, axis=1).max() < 0.1
+    named = run("recover", "stuck.bvh", "--place", "--frames", "60:120", "-o", "named.bvh")
+    assert named.code == 0
+    assert np.abs(load(Path("named.bvh")).root - load(Path("stuck.recovered.bvh")).root).max() < 1e-4
+    assert run("recover", "stuck.bvh", "--place", "--joints", "LeftArm").code == 2
+
+
 def test_recover(run, take):
     done = run("recover", "take.bvh", "--joints", "LeftForeArm", "--frames", "60:80", "--method", "spline")
     assert done.code == 0

@@ -21,6 +21,7 @@ def recover(
     /,
     *,
     joints: list[str] = [],  # noqa: B006
+    place: bool = False,
     frames: str | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
@@ -34,8 +35,9 @@ def recover(
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
     Without --joints it finds what drops out: joints that snap to their rest pose, or jump away and
-    back (as arms that were taken for each other), within a second, and spikes, at any frames; what
-    else is missing is listed, and `interpose fill` fills it.
+    back (as arms that were taken for each other), within a second, and spikes, at any frames; and
+    hips that stay where they are while they turn. What else is missing is listed, and
+    `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -44,10 +46,13 @@ def recover(
       interpose recover take.bvh --joints LeftArm,LeftForeArm,LeftHand
       interpose recover take.bvh --joints RightFoot --frames 120:160
       interpose recover take.bvh
+      interpose recover suit.bvh --place
 
     Args:
         file: the clip (.bvh, .npz, .amc).
         joints: the joints, separated by commas; without any, those that drop out.
+        place: where the body is, is lost, and how it is turned is known, as of suits that know no places:
+            feet that stand tell it. Without --frames it begins where the first frame is.
         frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
         output: where to write the clip; the report goes beside it.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
@@ -71,13 +76,20 @@ def recover(
     clip = reading.load(file)
     gap = range_of(frames, clip, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
+    if place and chosen:
+        raise RequestError(
+            "--joints and --place cannot be recovered at once",
+            "feet tell the place only where all turns are known",
+            "Recover the joints first, and then the place.",
+        )
     for name in chosen or ():
         clip.skeleton.index(name)
     outputs = Outputs.choose(file, output, "recovered", player)
     outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
-        done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance)
-    others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if chosen is None else []
+        done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance, place)
+    looked = chosen is None and not place
+    others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
     if not (done.report.gaps or done.report.moments):
         fix = "Name joints that are lost for longer: --joints LeftArm."
         raise RequestError(

@@ -105,18 +105,18 @@ def _scanned(file: Path, clip: Clip) -> Request:
     gaps = to_gaps(found)
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
     dropped = [one for one in found if one.kind == "lost"]
-    if len(found) > len(dropped) and not gaps:
-        why = "a scan finds only positions that stand still, and a position alone cannot be filled"
-        raise RequestError(f"nothing to fill in {file}", why, fix)
+    stuck = [one for one in found if one.kind == "frozen position"]
     if not gaps:
         why = "no --gap is given, and a scan finds nothing missing"
-        if dropped:
-            why += " but joints that drop out for moments, which `interpose recover` restores"
+        if dropped or stuck:
+            kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(
+                stuck
+            )
+            why += f" but {' and '.join(kinds)}, which `interpose recover` restores"
         raise RequestError(f"nothing to fill in {file}", why, fix)
     lines = ["no --gap is given, so what a scan finds is filled:"]
     lines += [f"  {one.start}:{one.stop} {one.kind}, {one.note}" for one in found if one.kind not in NO_GAPS]
-    passed_over = [one for one in found if one.kind == "frozen position"]
-    lines += [f"  {one.start}:{one.stop} {one.kind} is not, as it is one alone" for one in passed_over]
+    lines += [f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in stuck]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
     return Request(gaps, said="\n".join(lines))

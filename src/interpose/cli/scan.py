@@ -61,6 +61,4 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
     if len(to_gaps(found)) + len(dropped) < len(found):
-        say(
-            "A position alone cannot be filled; name the frames of the whole pose with fill --gap START:STOP."
-        )
+        say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")

@@ -20,6 +20,7 @@ from interpose.errors import RequestError
 from interpose.finish import feet
 from interpose.finish.report import Completion, JointNoise, NoiseReport, Provenance, Report
 from interpose.finish.solve import solve
+from interpose.finish.standing import steadied
 from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
@@ -28,7 +29,7 @@ from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
 from interpose.skeletons import find_mapping
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import hips_of, placed
 
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -52,6 +53,8 @@ SHAKY, AROUND, FAR = 0.005, 3, 2.5
 # Real feet stand, other than networks': what moves further than this (metres), or than so many deviations of
 # its noise, is a step.
 STANCE, STRAYS = 0.1, 3.0
+# The place of the body alone is noisy where it trembles so many times as much as any joint against it.
+ALIKE = 3.0
 # Seconds over which the result goes over into the frames before and after a range.
 BLEND = 0.2
 
@@ -93,6 +96,9 @@ def denoised(
     seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
     filled = cut if seen.complete else fill(cut, seen)
     noise = deviation(filled.positions())
+    if strength > 0 and (shaken := _shaken(filled, free)):
+        filled = steadied(filled, strength * shaken)
+        noise = deviation(filled.positions())
     done = cut
     if strength > 0:
         done = _ease(filled, _smooth(filled, free, strength, noise), start > 0, stop < len(clip))
@@ -115,6 +121,22 @@ def _free(clip: Clip, joints: Sequence[int] | None) -> Observation:
     moved = np.zeros_like(chosen)
     moved[:, placed(clip)] = True
     return Observation(chosen, chosen & moved)
+
+
+def _shaken(clip: Clip, free: Observation) -> float:
+    """Metres of noise along an axis, if the place of the body alone has any; else 0.
+
+    Then all joints tremble alike, and against the hips hardly: smoothed each for itself they would bend limbs
+    of which all is known.
+    """
+    hips = hips_of(clip.skeleton)
+    carriers = [joint for joint in placed(clip) if joint in (hips, *clip.skeleton.ancestors(hips))]
+    if not find_mapping(clip.skeleton).usable or not free.translation[:, carriers[-1:]].all():
+        return 0.0
+    places = clip.positions()
+    shaken = float(deviation(places[:, [hips]])[0])
+    own = np.delete(deviation(places - places[:, [hips]]), hips)
+    return shaken if shaken > ALIKE * own.max() else 0.0
 
 
 def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:

@@ -19,6 +19,7 @@ from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
+from interpose.finish.standing import alone, stood
 from interpose.finish.windows import grow
 from interpose.formats import held
 from interpose.geometry import rotations
@@ -159,6 +160,11 @@ def complete(
         raw = method.complete(hidden, observation, seed)
 
     opinion, error = _opinion(raw, known, spans)
+    if not isinstance(method, Layer):
+        opinion = _carried(opinion, hidden, known)
+        for span in spans:
+            if alone(known, hidden)[span.start : span.stop].any():
+                span.notes.append((span.start, span.stop - 1, "what the body stands on tells where it is"))
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
@@ -194,7 +200,7 @@ def complete(
         second = _second(
             fallback, hidden, observation, [g for g in gaps if _of(spans, g) in failed], seed
         ).clip
-        second = held(second, clip.source)
+        second = held(_carried(second, hidden, known), clip.source)
         merged, own = _merge(second, hidden, known), _merge(current, hidden, known)
         for span in failed:
             _write(current, merged, span.start, (span.start, span.stop))
@@ -453,6 +459,13 @@ def _merge(opinion: Clip, hidden: Clip, known: Observation) -> Clip:
         np.where(known.rotation[..., None], hidden.rotation, rotations.normalize(opinion.rotation)),
         np.where(seen, hidden.translation, opinion.translation),
     )
+
+
+def _carried(opinion: Clip, hidden: Clip, known: Observation) -> Clip:
+    """The opinion, with the body where its feet say if its place is all that is lost."""
+    if not alone(known, hidden).any():
+        return opinion
+    return opinion.with_motion(opinion.rotation, stood(_merge(opinion, hidden, known), known).translation)
 
 
 def _jump(

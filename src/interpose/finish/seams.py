@@ -150,15 +150,16 @@ def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     missing beside it, and whose own place is known there.
 
     What another one does that is missing all the while, as a foot that lands, is no seam of theirs, nor is
-    what a lost hand does where the body is lost, too.
+    what a lost hand does where the body is lost, too. A place that is lost alone is the seam of the joint
+    that has it: all others move against it as they are known to.
     """
     columns = list(motion.translated)
-    ends = [now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation)]
-    turned, moved = ends[0], np.zeros_like(ends[1])
-    moved[:, columns] = ends[1][:, columns]
+    turned, shifted = (now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation))
+    moved = np.zeros_like(turned)
     for joint, parent in enumerate(motion.skeleton.parents):
         if parent >= 0:
-            moved[:, joint] |= moved[:, parent] | turned[:, parent]
+            moved[:, joint] = moved[:, parent] | turned[:, parent]
+    moved[:, columns] |= shifted[:, columns]
     placed = Observation(known.rotation[at], known.translation[at]).positions(motion.skeleton)
     return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
 

@@ -105,9 +105,17 @@ def strays(clip: Clip) -> list[int]:
     return [one.start for one in _strays(clip, _steps(clip, Observation.full(clip))[0])]
 
 
+def stuck(clip: Clip) -> list[Finding]:
+    """The "frozen position" findings of `scan`: where the body is lost, and how it is turned is known."""
+    if len(clip) <= 2:
+        return []
+    turned, moved = _steps(clip, Observation.full(clip))
+    return [one for one in _frozen(clip, turned, moved, 0) if one.kind == "frozen position"]
+
+
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
     """The gaps to fill. A frozen position is none: a gap cannot be in the root's position alone. Nor are
-    values that drop out: `recover` finds them by itself."""
+    values that drop out: `recover` finds both by itself."""
     return [Gap(f.start, f.stop, f.joints) for f in findings if f.kind not in NO_GAPS]
 
 

@@ -1,0 +1,93 @@
+"""Where a body is, told by what it stands on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tests.skeletons.rigs import under_root
+
+import interpose
+from interpose.clip import Clip
+from interpose.geometry import rotations
+from interpose.observation import Observation
+from interpose.observation.timeline import Placement
+from interpose.skeletons.carrier import hips_of
+
+
+def _off(one: Clip, other: Clip) -> np.ndarray:
+    """(F,) metres between the hips."""
+    hips = hips_of(one.skeleton)
+    return np.linalg.norm(one.positions()[:, hips] - other.positions()[:, hips], axis=-1)
+
+
+def _stuck(clip: Clip, start: int, stop: int) -> Clip:
+    """The hips stay where they are from frame start on, until they are found again at frame stop."""
+    hips = clip.translated.index(hips_of(clip.skeleton))
+    translation = clip.translation.copy()
+    translation[start:stop, hips] = translation[start - 1 if start else 0, hips]
+    return clip.with_motion(clip.rotation, translation)
+
+
+@pytest.mark.parametrize(("start", "stop"), [(40, 80), (60, 150), (100, 190)])
+def test_the_place_of_the_body_is_recovered_from_its_feet(cmu_walk, start, stop):
+    clip = cmu_walk
+    done = interpose.recover(_stuck(clip, start, stop), frames=(start, stop), place=True)
+    error, line = _off(done.clip, clip), _off(interpose.fill(clip, (start, stop), method="linear").clip, clip)
+    assert error[start:stop].mean() < max(0.005, 0.15 * line[start:stop].mean())
+    assert done.clip.rotation.tobytes() == clip.rotation.tobytes()
+    assert error[:start].max() == error[stop:].max() == 0
+    (gap,) = done.report.gaps
+    assert "what the body stands on tells where it is" in gap.notes
+    assert gap.seam_after <= gap.seam_limit
+
+
+@pytest.mark.parametrize(
+    "rig", [lambda clip: clip, lambda clip: under_root(clip, False)], ids=["root", "hips"]
+)
+def test_a_suit_that_knows_no_places(cmu_walk, rig):
+    """Four metres of way, from the first frame on."""
+    clip = rig(cmu_walk)
+    done = interpose.recover(_stuck(clip, 0, len(clip)), place=True)
+    assert _off(done.clip, clip).max() < 0.2
+    assert np.abs((done.clip.positions() - clip.positions())[..., 1]).max() < 0.03
+
+
+def test_hips_that_stand_still_are_found(cmu_walk):
+    done = interpose.recover(_stuck(cmu_walk, 80, 120))
+    assert _off(done.clip, cmu_walk)[80:120].mean() < 0.03
+
+
+def test_it_turns_and_moves_with_the_clip(cmu_walk):
+    placement = Placement(1.1, (3.0, 0.5, -2.0))
+    one = interpose.recover(cmu_walk, frames=(60, 150), place=True).clip
+    other = interpose.recover(placement.of(cmu_walk), frames=(60, 150), place=True).clip
+    assert np.abs(placement.of(one).positions() - other.positions()).max() < 1e-6
+
+
+def test_nothing_of_what_is_lost_is_looked_at(cmu_walk):
+    translation = cmu_walk.translation.copy()
+    translation[60:150] = 1e3
+    seen = Observation.full(cmu_walk)
+    seen.translation[60:150, 0] = False
+    done = [
+        interpose.fill(cmu_walk.with_motion(cmu_walk.rotation, t), seen).clip
+        for t in (translation, cmu_walk.translation)
+    ]
+    assert done[0].translation.tobytes() == done[1].translation.tobytes()
+
+
+def test_joints_and_place_at_once_are_refused(cmu_walk):
+    with pytest.raises(interpose.RequestError, match="at once"):
+        interpose.recover(cmu_walk, "LeftArm", place=True)
+
+
+def test_noise_on_the_place_alone_bends_no_limb(cmu_walk):
+    rng = np.random.default_rng(0)
+    noisy = cmu_walk.with_motion(
+        cmu_walk.rotation, cmu_walk.translation + rng.normal(scale=0.02, size=cmu_walk.translation.shape)
+    )
+    done = interpose.denoise(noisy).clip
+    assert _off(done, cmu_walk).mean() < 0.35 * _off(noisy, cmu_walk).mean()
+    turned = np.degrees(rotations.angle(done.rotation, cmu_walk.rotation))
+    assert turned.mean() < 0.2
+    assert turned.max() < 5
