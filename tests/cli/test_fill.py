@@ -357,6 +357,15 @@ def test_convert(run, take):
     assert run("convert", "take.bvh", "slow.bvh").code == 2
 
 
+def test_convert_to_more_frames_leads_through_the_old_ones_without_corners(run, take):
+    assert run("convert", "take.bvh", "fast.bvh", "--fps", "120").code == 0
+    old, new = load(take), load(take.with_name("fast.bvh"))
+    assert np.abs(new.positions()[::4] - old.positions()).max() < 1e-4
+    # In a straight line all change of velocity would be at the old frames: a quarter of it is, and a little.
+    jumps = np.linalg.norm(np.diff(new.root, 2, axis=0), axis=1)
+    assert jumps[3::4].mean() < 2 * jumps.mean()
+
+
 @pytest.mark.parametrize("options", [[], ["--up", "z"]])
 def test_another_rate_keeps_the_layout(run, take, options):
     assert run("convert", "take.bvh", "slow.bvh", "--fps", "15", *options).code == 0

@@ -179,3 +179,10 @@ def test_pins_are_cut_with_their_observation(cmu_walk):
     assert pin.frames.tolist() == [5]
     assert seen.slice(0, 80).pins == ()
     assert pins.meet(cmu_walk, Observation.full(cmu_walk), seen.pins) is cmu_walk
+
+
+def test_one_joint_at_two_places_is_refused(cmu_walk):
+    there, elsewhere = lifted(cmu_walk), lifted(cmu_walk, up=(0.0, 0.1, 0.1))
+    with pytest.raises(RequestError, match="two places at frame 85"):
+        tasks.fill(cmu_walk, [GAP], "spline", pins=[there, elsewhere])
+    tasks.fill(cmu_walk, [GAP], "spline", pins=[there, replace(there)])

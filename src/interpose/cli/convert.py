@@ -56,7 +56,7 @@ def convert(
             "nobody records or plays that",
             f"Choose up to {FASTEST:g}.",
         )
-    made = replace(resample(clip, fps), source=clip.source) if fps is not None else clip
+    made = replace(resample(clip, fps, smooth=True), source=clip.source) if fps is not None else clip
     notes = save(replace(made, name=output.stem), output, force=force)
     say("\n".join(describe(file, clip)))
     for note in notes:

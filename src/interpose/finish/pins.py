@@ -73,6 +73,16 @@ def check(clip: Clip, observation: Observation) -> None:
                 "where it is, or how it is turned, follows from what is observed, which comes back unchanged",
                 "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
             )
+    places: dict[tuple[str, int], np.ndarray] = {}
+    for pin in observation.pins:
+        for frame, place in zip(pin.frames, () if pin.position is None else pin.position):
+            other = places.setdefault((pin.joint, int(frame)), np.asarray(place))
+            if (apart := float(np.linalg.norm(place - other))) > pin.tolerance:
+                raise RequestError(
+                    f"{pin.joint} is pinned to two places at frame {frame}",
+                    f"they are {100 * apart:.1f} cm apart, and it can be at one of them",
+                    "Leave one of the pins out.",
+                )
 
 
 def merged(pins: Iterable[Pin]) -> tuple[Pin, ...]:
