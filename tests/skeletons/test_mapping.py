@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -187,6 +188,9 @@ def test_bones_without_length_are_no_body(cmu_walk):
 def test_a_map_file_says_what_was_found_and_is_read_back(cmu_walk, tmp_path):
     path = tmp_path / "map.json"
     path.write_text(map_text(find_mapping(cmu_walk.skeleton)))
+    held = json.loads(path.read_text())
+    assert list(held["joints"]) == list(JOINTS), "those that were not found, too"
+    assert {*held["unused"], *held["joints"].values()} == {*cmu_walk.skeleton.names}
     nameless = renamed(cmu_walk.skeleton)
     roles = {
         name: nameless.names[cmu_walk.skeleton.index(own)] if own else ""

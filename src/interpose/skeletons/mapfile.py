@@ -4,7 +4,7 @@
 
 "joints" names the skeleton's own joint for each canonical one; "" or null says that it has none; what is left
 out is found as ever. "root" may name the topmost joint of the character that is meant, "hand" say "left" or
-"right" of the file's axes.
+"right" of the file's axes. Other keys are for the reader: "unused" lists the joints that are none of these.
 """
 
 from __future__ import annotations
@@ -53,12 +53,13 @@ def read_map(path: str | Path) -> dict[str, str]:
 
 
 def map_text(mapping: Mapping) -> str:
-    """What such a file holds for a mapping: the joints that were found."""
+    """What such a file holds for a mapping: every canonical joint, "" for those that were not found, and the
+    joints of the skeleton that are none of them."""
     names, roles = mapping.skeleton.names, mapping.skeleton.roles
-    own = {name: names[joint] for name, joint in zip(JOINTS, mapping.joints) if joint is not None}
-    own |= {name: "" for name, said in roles.items() if said == ""}
+    own = {name: "" if joint is None else names[joint] for name, joint in zip(JOINTS, mapping.joints)}
     content = {key: roles[key] for key in ("root", "hand") if roles.get(key)}
-    return json.dumps({**content, "joints": own}, indent=2) + "\n"
+    unused = [name for name in names if name not in own.values()]
+    return json.dumps({**content, "joints": own, "unused": unused}, indent=2) + "\n"
 
 
 def is_map(path: Path) -> bool:
