@@ -23,6 +23,7 @@ from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
+from interpose.skeletons.carrier import placed
 
 FRAMES = 120
 LEGS = tuple(joint for limb in LIMBS for joint in limb if JOINTS[limb[0]].endswith("UpLeg"))
@@ -71,6 +72,14 @@ def _joints(window: Window, *losses: tuple[Sequence[int], int, int]) -> Hidden:
     return Hidden((0, FRAMES), Observation.from_gaps(window.clip, gaps), moved)
 
 
+def _place(window: Window, length: int) -> Hidden:
+    """Where the body is, in so many frames in the middle; all turns are known."""
+    start = (FRAMES - length) // 2
+    seen, clip = Observation.full(window.clip), window.clip
+    seen.translation[start : start + length, placed(clip)[-1]] = False
+    return Hidden((0, FRAMES), seen, np.repeat(~seen.frames[:, None], len(JOINTS), axis=1))
+
+
 def _draw(rng: np.random.Generator, count: int) -> list[int]:
     """So many joints other than the hips, each with something that hangs from it."""
     inner = sorted({*PARENTS} - {-1, 0})
@@ -91,6 +100,8 @@ TASKS: dict[str, Callable[[Window, np.random.Generator], Hidden]] = {
     "three joints lost": lambda w, rng: _joints(w, (_draw(rng, 3), 0, FRAMES)),
     "an arm or a leg lost": lambda w, rng: _joints(w, (LIMBS[rng.integers(len(LIMBS))], 0, FRAMES)),
     "legs from the upper body": lambda w, rng: _joints(w, (LEGS, 0, FRAMES)),
+    # Whatever the method, it is what the body stands on that tells it.
+    "where the body is lost for 2 s, all turns known": lambda w, rng: _place(w, 60),
     "forecast of 1 s": lambda w, rng: _gap(w, 30, ALL, 0),
     # Each before the one ahead is back.
     "arms and legs lost in turn, 1 s each": lambda w, rng: _joints(
