@@ -17,9 +17,12 @@ from interpose.finish import complete
 from interpose.finish.report import GapReport
 from interpose.formats import load
 from interpose.geometry import rotations
+from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights
 from interpose.observation import Gap, Observation, timeline
+from interpose.skeletons import find_humanoid
+from interpose.skeletons.body import facing
 
 METHODS = (*registry.names(), "auto")
 
@@ -395,6 +398,18 @@ def test_auto_takes_networks_at_any_length_where_keys_are_lone(cmu_walk):
     )
     assert methods((1, 150)) == ["spline"], "longer than it can fill"
     assert [gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps] == ["small", "small"]
+
+
+def test_half_a_turn_between_lone_keys_takes_the_time_there_is(cmu_walk):
+    """Seen from either way round it is as far; `small` would snap."""
+    pose, body = cmu_walk.slice(0, 1), find_humanoid(cmu_walk)
+    for degrees, method in ((100, "small"), (175, "cmib")):
+        yaw = np.radians(degrees)
+        there = timeline.Placement(yaw, tuple(pose.root[0] - turn(pose.root[0], np.array(yaw)))).of(pose)
+        done = tasks.between(tasks.block({0: pose, 46: there}), [0, 46])
+        assert done.report.gaps[0].method == method
+        faces = np.unwrap(facing(body.positions(done.clip)))
+        assert np.degrees(np.abs(np.diff(faces))).max() * cmu_walk.fps < 330
 
 
 def dropped(clip, share):  # type: ignore[no-untyped-def]

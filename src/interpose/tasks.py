@@ -568,7 +568,9 @@ def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[
     if observation.rotation[gap.start : gap.stop].all():
         # What the body stands on tells more of where it is than any method.
         return Spline(), None
-    chosen, note = auto.choose(clip, lead, _lone(observation, gap))
+    lone = _lone(observation, gap)
+    turned = auto.turns(clip, gap) if lone == 2 and gap.joints is None else 0.0
+    chosen, note = auto.choose(clip, lead, lone, turned)
     if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
         # Too short for a network alone, amid joints that are lost for longer.
         return auto.choose(clip, parted)

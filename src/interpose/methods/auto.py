@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from interpose.clip import Clip
 from interpose.errors import RequestError
+from interpose.geometry import rotations
 from interpose.methods import registry, weights
 from interpose.methods.protocol import Method
 from interpose.observation import Gap
+from interpose.skeletons.carrier import hips_of
 
+UP = np.array([0.0, 1.0, 0.0])
 # Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
 # keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.6 and
 # 7.4 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
@@ -20,18 +25,23 @@ NETWORKS, KEYS = ("small", "cae", "small-open"), ("small", "cmib", "small-open")
 # frames joints are off by .25 and .36 cm, the spline's by .43 and .69 (at the beginning .44 and .66, .59 and
 # .96); `cae` and `small-open` are not.
 AT_ENDS = ("small",)
+# Degrees between two lone keys about the vertical from which on `small`, which sees no way round, takes half
+# a turn in six frames (600 degrees a second), and `cmib` goes round in the time there is (250).
+HALF_TURN = 160.0
 
 
-def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
+def choose(clip: Clip, gap: Gap, lone: int = 0, turns: float = 0.0) -> tuple[Method, str | None]:
     """The method that measured best on validation performers for gaps of this length.
 
     A network from its length on, unless it refuses: then the next best one. Joints that are missing on their
     own go to networks at any length, as do gaps between two single keys (`lone` is 2), as nothing tells how
     fast anything moves there, and to AT_ENDS those at an end of the clip. The spline else, and where no
-    weights are installed; then with the reason why no network fills a gap that would be its own.
+    weights are installed; then with the reason why no network fills a gap that would be its own. `turns` is
+    by how many degrees the body turns from one lone key to the other.
     """
     why, short, at_end = None, False, gap.start == 0 or gap.stop == len(clip)
-    for name in KEYS if gap.joints is None and lone == 2 else NETWORKS:
+    keys = (KEYS[1], KEYS[0], *KEYS[2:]) if turns > HALF_TURN else KEYS
+    for name in keys if gap.joints is None and lone == 2 else NETWORKS:
         try:
             card = weights.find(name)
         except RequestError as error:
@@ -48,6 +58,15 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
             return network, None
         why = why or f"not filled by {name}: {reason}"
     return registry.get("spline"), None if short else why
+
+
+def turns(clip: Clip, gap: Gap) -> float:
+    """Degrees about the vertical from the pose before a gap to the one after it."""
+    hips = hips_of(clip.skeleton)
+    ends = clip.slice(gap.start - 1, gap.start), clip.slice(gap.stop, gap.stop + 1)
+    before, after = (end.kinematics()[0][0, hips] for end in ends)
+    turned = rotations.multiply(after, rotations.conjugate(before))
+    return float(np.degrees(rotations.angle(rotations.twist_about(turned, UP), rotations.identity())))
 
 
 def choose_told(clip: Clip, gap: Gap, lone: int, action: str) -> Method:
