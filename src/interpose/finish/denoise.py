@@ -53,8 +53,9 @@ SHAKY, AROUND, FAR = 0.005, 3, 2.5
 # Real feet stand, other than networks': what moves further than this (metres), or than so many deviations of
 # its noise, is a step.
 STANCE, STRAYS = 0.1, 3.0
-# The place of the body alone is noisy where it trembles so many times as much as any joint against it.
-ALIKE = 3.0
+# The place of the body alone is noisy where it trembles by more than this (metres), and so many times as much
+# as any joint against it.
+TREMBLES, ALIKE = 5e-4, 3.0
 # Seconds over which the result goes over into the frames before and after a range.
 BLEND = 0.2
 
@@ -136,7 +137,7 @@ def _shaken(clip: Clip, free: Observation) -> float:
     places = clip.positions()
     shaken = float(deviation(places[:, [hips]])[0])
     own = np.delete(deviation(places - places[:, [hips]]), hips)
-    return shaken if shaken > ALIKE * own.max() else 0.0
+    return shaken if shaken > max(TREMBLES, ALIKE * own.max()) else 0.0
 
 
 def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:
