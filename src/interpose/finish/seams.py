@@ -134,14 +134,19 @@ def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Cl
 def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     """(n, J, 3) velocity jumps of all joints at n observed frames beside gaps, in metres per frame squared.
 
-    Zero for joints whose positions are observed around them: what they do is no seam.
+    Zero for joints that are told around them, as to where they are against what carries them: what they do is
+    no seam.
     """
     before, after = at - 1, at + 1
     near = np.concatenate([before, at, after])
     where = motion.with_motion(motion.rotation[near], motion.translation[near]).positions()
     where = where.reshape(3, len(at), *where.shape[1:])
-    seen = Observation(known.rotation[near], known.translation[near]).positions(motion.skeleton)
-    first, second, third = seen.reshape(3, len(at), -1)
+    above = np.ones((len(near), len(motion.skeleton)), bool)  # all turns above a joint are known
+    for joint, parent in enumerate(motion.skeleton.parents):
+        if parent >= 0:
+            above[:, joint] = above[:, parent] & known.rotation[near, parent]
+    told = above & known.translation[near]
+    first, second, third = told.reshape(3, len(at), -1)
     return np.where((first & second & third)[..., None], 0.0, where[0] - 2 * where[1] + where[2])
 
 

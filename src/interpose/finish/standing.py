@@ -23,7 +23,6 @@ SLOW, HIGH = 0.5, 0.05
 GOES_ON, FLOOR, FIXED = 1.0, 0.01, 1e6
 GRAVITY = 9.81  # metres per second squared
 PULL = 2  # times gravity: nobody comes down faster, as far as can be told
-NEAR = 1.0  # seconds of known frames in which the lowest foot tells the floor
 ROUNDS = 40  # at most, of finding what stands, and where that puts the body
 # Metres a frame that what stands moves at 30 fps, as far as noise on places counts beside it.
 STEADY = 0.004
@@ -88,13 +87,13 @@ def _placed(clip: Clip, carrier: int, joints: list[int], trusted: np.ndarray, le
     hips, grown = hips_of(clip.skeleton), feet.size(clip.skeleton)
     root, against = placed[:, hips], placed[:, joints] - placed[:, None, hips]
     heights = against[..., 1]
-    floor = _floor(root[:, 1] + heights.min(axis=1), trusted > 0, clip.fps) if level else None
+    slow = SLOW * grown / clip.fps
+    floor = _floor(root[:, None] + against, trusted > 0, slow) if level else None
     stands = _begun(root, against, trusted >= FIXED, grown * GRAVITY / clip.fps**2)
     for _ in range(ROUNDS):
         path = _carried(root, against, stands, trusted, floor, clip.fps, grown)
-        pace = np.linalg.norm(np.gradient(path[:, None] + against, axis=0), axis=-1) * clip.fps
-        slow = pace < SLOW * grown
-        still = slow & (heights < heights.min(axis=1, keepdims=True) + HIGH * grown)
+        pace = np.linalg.norm(np.gradient(path[:, None] + against, axis=0), axis=-1)
+        still = (pace < slow) & (heights < heights.min(axis=1, keepdims=True) + HIGH * grown)
         before, stands = stands, still[1:] & still[:-1]
         if (stands == before).all():
             break
@@ -137,12 +136,20 @@ def _begun(root: np.ndarray, against: np.ndarray, known: np.ndarray, falls: floa
     return stands
 
 
-def _floor(lowest: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
-    """(F,) the height of the floor: of the lowest foot (F,) in known frames nearby, and even in between."""
-    at = np.flatnonzero(known)
-    near = round(NEAR * fps)
-    told = [lowest[max(0, i - near) : i + near + 1][known[max(0, i - near) : i + near + 1]].min() for i in at]
-    return np.interp(np.arange(len(lowest)), at, told)
+def _floor(feet: np.ndarray, known: np.ndarray, slow: float) -> np.ndarray:
+    """(F,) the height of the floor: of the lowest joint (F, n, 3) that stands, in the nearest frame that is
+    known (F,) of one that does; even in between.
+
+    slow: metres a frame below which it stands.
+    """
+    lowest = feet[..., 1].argmin(axis=1)
+    pace = np.linalg.norm(np.gradient(feet, axis=0), axis=-1)
+    height, still = (np.take_along_axis(v, lowest[:, None], 1)[:, 0] for v in (feet[..., 1], pace))
+    sure = known & np.roll(known, 1) & np.roll(known, -1)
+    at = np.flatnonzero(sure & (still < slow))
+    if not len(at):
+        return np.full(len(height), height[known].min())
+    return np.interp(np.arange(len(height)), at, height[at])
 
 
 def _carried(
