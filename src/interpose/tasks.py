@@ -17,6 +17,7 @@ from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, seams
 from interpose.finish import pins as pinning
 from interpose.finish.denoise import denoised
+from interpose.finish.feet import legs
 from interpose.finish.guarantees import wipe
 from interpose.finish.measures import acceleration
 from interpose.finish.path import spans as path_spans
@@ -243,6 +244,12 @@ def recover(
                 "joints and the place of the body cannot be recovered at once",
                 "feet tell the place only where all turns are known",
                 "Recover the joints first, and then the place.",
+            )
+        if not legs(clip.skeleton):
+            raise RequestError(
+                "the place of the body cannot be recovered",
+                "what it stands on tells it, and no legs were found",
+                "Name them: --map, or load(..., roles=...).",
             )
         seen = Observation.full(clip)
         seen.translation[start + (start == 0 and stop == len(clip)) : stop, placing(clip)[-1:]] = False

@@ -7,7 +7,7 @@ import pytest
 from tests.skeletons.rigs import under_root
 
 import interpose
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.observation.timeline import Placement
@@ -79,6 +79,13 @@ def test_nothing_of_what_is_lost_is_looked_at(cmu_walk):
 def test_joints_and_place_at_once_are_refused(cmu_walk):
     with pytest.raises(interpose.RequestError, match="at once"):
         interpose.recover(cmu_walk, "LeftArm", place=True)
+
+
+def test_what_has_no_legs_is_refused():
+    chain = Skeleton(("a", "b", "c"), (-1, 0, 1), np.tile([0.0, 0.3, 0.0], (3, 1)))
+    clip = Clip(chain, np.tile([1.0, 0, 0, 0], (20, 3, 1)), np.zeros((20, 1, 3)), 30.0)
+    with pytest.raises(interpose.RequestError, match="cannot be recovered"):
+        interpose.recover(clip, place=True)
 
 
 def test_noise_on_the_place_alone_bends_no_limb(cmu_walk):

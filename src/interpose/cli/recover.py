@@ -34,10 +34,10 @@ def recover(
 ) -> int:
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
-    Without --joints it finds what drops out: joints that snap to their rest pose, or jump away and
-    back (as arms that were taken for each other), within a second, and spikes, at any frames; and
-    hips that stay where they are while they turn. What else is missing is listed, and
-    `interpose fill` fills it.
+    Without --joints it finds what drops out: joints that snap to their rest
+    pose, or jump away and back (as arms that were taken for each other), within
+    a second, and spikes, at any frames; and hips that stay where they are while
+    they turn. What else is missing is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.

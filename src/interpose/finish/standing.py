@@ -29,10 +29,13 @@ STEADY = 0.004
 
 
 def alone(known: Observation, clip: Clip) -> np.ndarray:
-    """(F,) where the place of the body is lost and all turns between it and the feet are known."""
+    """(F,) where the place of the body is lost and all turns between it and the feet are known; nowhere where
+    there are no feet."""
     skeleton, hips = clip.skeleton, hips_of(clip.skeleton)
-    chains = {hips, *skeleton.ancestors(hips)}
-    for leg in feet.legs(skeleton):
+    chains, legs = {hips, *skeleton.ancestors(hips)}, feet.legs(skeleton)
+    if not legs:
+        return np.zeros(len(known.rotation), bool)
+    for leg in legs:
         chains |= {leg.thigh, leg.knee, leg.ankle, *skeleton.ancestors(leg.thigh)}
     turned = known.rotation[:, sorted(chains)].all(axis=1)
     return np.logical_and(turned, np.logical_not(known.positions(skeleton)[:, hips]))
