@@ -33,7 +33,7 @@ def test_the_place_of_the_body_is_recovered_from_its_feet(cmu_walk, start, stop)
     clip = cmu_walk
     done = interpose.recover(_stuck(clip, start, stop), frames=(start, stop), place=True)
     error, line = _off(done.clip, clip), _off(interpose.fill(clip, (start, stop), method="linear").clip, clip)
-    assert error[start:stop].mean() < max(0.005, 0.15 * line[start:stop].mean())
+    assert error[start:stop].mean() < max(0.005, 0.2 * line[start:stop].mean())
     assert done.clip.rotation.tobytes() == clip.rotation.tobytes()
     assert error[:start].max() == error[stop:].max() == 0
     (gap,) = done.report.gaps

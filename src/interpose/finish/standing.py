@@ -15,9 +15,10 @@ from interpose.observation import Observation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, moved
 
-# A joint stands that is slower than this (metres a second) and no higher than this above the lowest one of
-# the body (metres). Chosen, as the weights below, on validation performers.
-SLOW, HIGH = 0.5, 0.05
+# A joint stands that is slower than this (metres a second, and this share of what the body does, whose way is
+# not known well) and no higher than this above the lowest one (metres). Chosen, as the weights below, on
+# validation performers.
+SLOW, HURRY, HIGH = 0.5, 0.1, 0.05
 # What counts beside a joint that stands: that the body goes on as it did, which in the air is all there is
 # (and that it falls there), and that it stands on the floor. Places that are known are as good as fixed.
 GOES_ON, FLOOR, FIXED = 1.0, 0.01, 1e6
@@ -96,7 +97,8 @@ def _placed(clip: Clip, carrier: int, joints: list[int], trusted: np.ndarray, le
     for _ in range(ROUNDS):
         path = _carried(root, against, stands, trusted, floor, clip.fps, grown)
         pace = np.linalg.norm(np.gradient(path[:, None] + against, axis=0), axis=-1)
-        still = (pace < slow) & (heights < heights.min(axis=1, keepdims=True) + HIGH * grown)
+        hurry = HURRY * np.linalg.norm(np.gradient(path, axis=0), axis=-1)[:, None]
+        still = (pace < slow + hurry) & (heights < heights.min(axis=1, keepdims=True) + HIGH * grown)
         before, stands = stands, still[1:] & still[:-1]
         if (stands == before).all():
             break
