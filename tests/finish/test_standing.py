@@ -81,6 +81,14 @@ def test_joints_and_place_at_once_are_refused(cmu_walk):
         interpose.recover(cmu_walk, "LeftArm", place=True)
 
 
+def test_what_never_stands_goes_on(cmu_walk):
+    """Turns at random, in which nothing tells where the body goes: an answer all the same."""
+    rng = np.random.default_rng(0)
+    turned = rotations.normalize(rng.standard_normal(cmu_walk.rotation.shape))
+    done = interpose.recover(cmu_walk.with_motion(turned, cmu_walk.translation), place=True)
+    assert np.isfinite(done.clip.translation).all()
+
+
 def test_what_has_no_legs_is_refused():
     chain = Skeleton(("a", "b", "c"), (-1, 0, 1), np.tile([0.0, 0.3, 0.0], (3, 1)))
     clip = Clip(chain, np.tile([1.0, 0, 0, 0], (20, 3, 1)), np.zeros((20, 1, 3)), 30.0)

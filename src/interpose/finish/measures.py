@@ -109,7 +109,9 @@ def foot_slide(positions: np.ndarray, fps: float, floor: np.ndarray | None = Non
     height = positions[..., 1] - np.broadcast_to(floor, positions.shape[:-1])
     height = np.maximum(0.5 * (height[1:] + height[:-1]), 0.0)
     step = np.linalg.norm(np.diff(positions[..., [0, 2]], axis=0), axis=-1)
-    return float((100.0 * fps * step * np.clip(2.0 - 2.0 ** (height / SLIDE_HEIGHT), 0.0, 1.0)).mean())
+    # From one SLIDE_HEIGHT on nothing is left; 2 to the power of all of it may be too much to hold.
+    low = np.clip(2.0 - 2.0 ** np.minimum(height / SLIDE_HEIGHT, 1.0), 0.0, 1.0)
+    return float((100.0 * fps * step * low).mean())
 
 
 def foot_travel(positions: np.ndarray) -> float:

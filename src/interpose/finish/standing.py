@@ -22,8 +22,9 @@ SLOW, HURRY, HIGH = 0.5, 0.1, 0.05
 # What counts beside a joint that stands: that the body goes on as it did, which in the air is all there is
 # (and that it falls there), and that it stands on the floor. Places that are known are as good as fixed.
 GOES_ON, FLOOR, FIXED = 1.0, 0.01, 1e6
+RESTS = 1e-6  # what it counts that a body stays where it is, where nothing else says anything
 GRAVITY = 9.81  # metres per second squared
-PULL = 2  # times gravity: nobody comes down faster, as far as can be told
+PULL = 2.0  # times gravity: nobody comes down faster, as far as can be told
 ROUNDS = 40  # at most, of finding what stands, and where that puts the body
 # Metres a frame that what stands moves at 30 fps, as far as noise on places counts beside it.
 STEADY = 0.004
@@ -141,15 +142,15 @@ def _begun(root: np.ndarray, against: np.ndarray, known: np.ndarray, falls: floa
     return stands
 
 
-def _floor(feet: np.ndarray, known: np.ndarray, slow: float) -> np.ndarray:
-    """(F,) the height of the floor: of the lowest joint (F, n, 3) that stands, in the nearest frame that is
-    known (F,) of one that does; even in between.
+def _floor(points: np.ndarray, known: np.ndarray, slow: float) -> np.ndarray:
+    """(F,) the height of the floor: of the lowest joint (F, n, 3) in the nearest `known` frames (F,) in which
+    it stands; even in between.
 
     slow: metres a frame below which it stands.
     """
-    lowest = feet[..., 1].argmin(axis=1)
-    pace = np.linalg.norm(np.gradient(feet, axis=0), axis=-1)
-    height, still = (np.take_along_axis(v, lowest[:, None], 1)[:, 0] for v in (feet[..., 1], pace))
+    lowest = points[..., 1].argmin(axis=1)
+    pace = np.linalg.norm(np.gradient(points, axis=0), axis=-1)
+    height, still = (np.take_along_axis(v, lowest[:, None], 1)[:, 0] for v in (points[..., 1], pace))
     sure = known & np.roll(known, 1) & np.roll(known, -1)
     at = np.flatnonzero(sure & (still < slow))
     if not len(at):
@@ -175,7 +176,7 @@ def _carried(
         floor: (F,) height of the floor, where that is to count.
         grown: the size of the body.
     """
-    count, held = len(root), stands.sum(axis=1)
+    count, held = len(root), RESTS + stands.sum(axis=1)
     step = -(stands[..., None] * np.diff(against, axis=0)).sum(axis=1)
     bands, right = np.zeros((3, count)), trusted[:, None] * root
     bands[0] = trusted
@@ -188,7 +189,8 @@ def _carried(
     # from one to the next as much more so.
     second, often = (1.0, -2.0, 1.0), fps / 30
     goes_on, on_floor = GOES_ON * often**2, FLOOR / often**2
-    down = np.where((held[1:] == 0) & (held[:-1] == 0), -grown * GRAVITY / fps**2, 0.0)
+    air = np.logical_not(stands.any(axis=1))
+    down = np.where(air[1:] & air[:-1], -grown * GRAVITY / fps**2, 0.0)
     for i, weight in enumerate(second):
         bands[0, i : count - 2 + i] += goes_on * weight**2
         right[i : count - 2 + i, 1] += goes_on * weight * down
