@@ -240,6 +240,25 @@ def trained(walk_pack, tmp_path_factory):  # type: ignore[no-untyped-def]
     return weights.load(folder / "weights", "small"), folder, told
 
 
+def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path):
+    card, pack = trained[0], walk_pack("lafan1", both=True)
+    settings = BaseSettings(width=24, layers=1, batch=4, longest=40, learning_rate=0.1)
+    model = train_base([pack], tmp_path, Budget.parse("3steps"), settings, start=card, say=lambda line: None)
+    made = export_base(tmp_path, [pack], tmp_path / "weights", ["train"], mean=card)
+    before, after = Base(model.config), Base(model.config)
+    restore(before, card.onnx)
+    restore(after, tmp_path / "weights" / "small.onnx")
+    apart = 0.0
+    for name, value in after.state_dict().items():
+        ends = before.state_dict()[name], model.state_dict()[name]
+        apart = max(apart, float((ends[1] - ends[0]).abs().max()))
+        assert torch.allclose(value, (ends[0] + ends[1]) / 2, atol=2e-3)
+    assert apart > 0.02, "it has learned something"
+    assert made.training["mean_with"].startswith("small of commit")
+    log = json.loads((tmp_path / "weights" / "log.jsonl").read_text().splitlines()[-1])
+    assert made.metrics["validation"]["gap5"] != log["gap5"], "measured anew"
+
+
 def test_a_run_goes_on_and_is_exported_whole(trained, given):
     card, folder, told = trained
     assert any("goes on at 67 %" in line for line in told)

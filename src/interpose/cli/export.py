@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -69,6 +70,7 @@ def base(
     *,
     of: Of,
     out: Path,
+    mean: str | None = None,
 ) -> None:
     """Write base.onnx or small.onnx, its card, and the training log with its curves.
 
@@ -77,10 +79,13 @@ def base(
 
     Args:
         out: the folder for the weights.
+        mean: the weights that the run started from, a name or a folder: their mean with the run's is written.
     """
+    from interpose.methods import weights
+
     with needs_torch("export a network"):
         from interpose.training.export import export_base
-    _export(export_base, of, out)
+    _export(partial(export_base, mean=weights.card(mean) if mean else None), of, out)
 
 
 @export.command

@@ -31,9 +31,10 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig
 from interpose.models.stmi_gan import Generator, StmiGanConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
-from interpose.training.base import chosen, title
+from interpose.training.base import JUDGED, SHORTEST, chosen, title, validate
 from interpose.training.cae import NETWORKS
-from interpose.training.loop import shard_paths
+from interpose.training.loop import restore, shard_paths
+from interpose.training.poses import Poses
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 from interpose.training.stmi_gan import JUDGE
 
@@ -490,18 +491,30 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
 
 
 def export_base(
-    folder: Path, packs: list[Pack], out: Path, splits: list[str], licence: str | None = None
+    folder: Path,
+    packs: list[Pack],
+    out: Path,
+    splits: list[str],
+    licence: str | None = None,
+    mean: Card | None = None,
 ) -> Card:
     """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
 
     licence: what the weights may be used for, where the packs do not decide.
+    mean: weights of the same network that the run started from, whose mean with the run's is written
+        (Wortsman et al. 2022): what the run learned at the cost of something else, it keeps half of. They are
+        measured anew, on the packs' validation performers.
     """
     run = _Run.of(folder)
     settings, log = run.settings, run.log
     network = settings.pop("network")
     name, labels = title(settings["config"], settings["datasets"]), network["labels"]
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
-    export_base_onnx(model, run.begin(out, name, model))
+    path, measured = run.begin(out, name, model), log[-1]
+    if mean:
+        settings["mean_with"] = f"{mean.name} of commit {mean.training.get('commit')}"
+        measured = halfway(model, mean, packs)
+    export_base_onnx(model, path)
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
     packs = chosen(packs, settings["datasets"])
@@ -516,12 +529,23 @@ def export_base(
         fps=30.0,
         max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
         training={**run.training("base", splits, model), "network": network},
-        metrics={"validation": log[-1]},
+        metrics={"validation": measured},
         auto=run.auto,
         labels=labels,
     )
     card.save(out / f"{name}.json")
     return card
+
+
+def halfway(model: Base, other: Card, packs: list[Pack]) -> dict[str, float]:
+    """Move a model's weights half of the way to others; what `validate` finds then."""
+    start = Base(model.config)
+    restore(start, other.onnx)
+    with torch.no_grad():
+        for name, value in model.state_dict().items():
+            value.lerp_(start.state_dict()[name].to(value.dtype), 0.5)
+    held_out = Poses(packs, ("validation",), model.config.labels, SHORTEST, torch.device("cpu"))
+    return validate(model.eval(), held_out.spread(128, JUDGED))
 
 
 def paces(packs: list[Pack], splits: list[str]) -> dict[str, list[float]]:
