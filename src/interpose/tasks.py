@@ -252,19 +252,29 @@ def recover(
                 "Name them: --map, or load(..., roles=...).",
             )
         seen = Observation.full(clip)
-        seen.translation[start + (start == 0 and stop == len(clip)) : stop, placing(clip)[-1:]] = False
+        seen.translation[start:stop, placing(clip)[-1:]] = False
+        if (start, stop) == (0, len(clip)):
+            # The first frame counts that belongs to the motion.
+            seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
     if joints is None:
-        seen = broken(clip)
-        for one in stuck(clip):
-            held = [clip.skeleton.index(name) for name in one.joints or ()]
-            seen.translation[one.start : one.stop, held] = False
-        outside = np.ones(len(clip), bool)
-        outside[start:stop] = False
-        outside[strays(clip)] = True
-        seen.rotation[outside], seen.translation[outside] = True, True
+        seen = _by_itself(clip, start, stop)
         return fill(clip, seen, method, seed=seed, progress=progress)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
+    """What is left of a clip without what was lost in frames start to stop - 1: what `recover` finds."""
+    seen, odd = broken(clip), strays(clip)
+    seen.rotation[odd], seen.translation[odd] = True, True
+    for one in stuck(clip):
+        held = [clip.skeleton.index(name) for name in one.joints or ()]
+        # A rest pose beside the frames in which a body is stuck does not tell where it is either.
+        beside = [frame for frame in odd if one.start - 1 <= frame <= one.stop]
+        seen.translation[np.ix_([*range(one.start, one.stop), *beside], held)] = False
+    seen.rotation[:start], seen.translation[:start] = True, True
+    seen.rotation[stop:], seen.translation[stop:] = True, True
+    return seen
 
 
 def denoise(

@@ -269,6 +269,10 @@ def test_the_place_of_a_body_is_recovered_by_name_and_where_it_stands_still(run,
     assert named.code == 0
     assert np.abs(load(Path("named.bvh")).root - load(Path("stuck.recovered.bvh")).root).max() < 1e-4
     assert run("recover", "stuck.bvh", "--place", "--joints", "LeftArm").code == 2
+    suit = clip.slice(0, 9)
+    suit.translation[:] = suit.translation[0]
+    save(suit, Path("suit.bvh"))
+    assert "recover suit.bvh --place" in run("recover", "suit.bvh").err
 
 
 def test_recover(run, take):

@@ -57,6 +57,18 @@ def test_hips_that_stand_still_are_found(cmu_walk):
     assert _off(done.clip, cmu_walk)[80:120].mean() < 0.03
 
 
+def test_a_rest_pose_beside_it_does_not_tell_where_the_body_is(cmu_walk):
+    """CMU's files begin with one, at the origin."""
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[0], translation[0] = cmu_walk.skeleton.rest_rotation, [[0.0, 1.0, 0.0]]
+    led = _stuck(cmu_walk.with_motion(rotation, translation), 1, 60)
+    led.translation[1:60] = cmu_walk.translation[60]
+    done = interpose.recover(led).clip
+    assert _off(done, cmu_walk)[1:60].max() < 0.1
+    whole = interpose.recover(cmu_walk.with_motion(rotation, translation), place=True).clip
+    assert _off(whole, cmu_walk)[1:].max() < 0.2
+
+
 def test_it_turns_and_moves_with_the_clip(cmu_walk):
     placement = Placement(1.1, (3.0, 0.5, -2.0))
     one = interpose.recover(cmu_walk, frames=(60, 150), place=True).clip
@@ -96,11 +108,15 @@ def test_what_has_no_legs_is_refused():
         interpose.recover(clip, place=True)
 
 
-def test_noise_on_the_place_alone_bends_no_limb(cmu_walk):
-    rng = np.random.default_rng(0)
-    noisy = cmu_walk.with_motion(
-        cmu_walk.rotation, cmu_walk.translation + rng.normal(scale=0.02, size=cmu_walk.translation.shape)
-    )
+@pytest.mark.parametrize(
+    "rig", [lambda clip: clip, lambda clip: under_root(clip, False)], ids=["root", "hips"]
+)
+def test_noise_on_the_place_alone_bends_no_limb(cmu_walk, rig):
+    cmu_walk = rig(cmu_walk)
+    hips, rng = hips_of(cmu_walk.skeleton), np.random.default_rng(0)
+    translation = cmu_walk.translation.copy()
+    translation[:, hips] += rng.normal(scale=0.02, size=translation[:, hips].shape)
+    noisy = cmu_walk.with_motion(cmu_walk.rotation, translation)
     done = interpose.denoise(noisy).clip
     assert _off(done, cmu_walk).mean() < 0.35 * _off(noisy, cmu_walk).mean()
     turned = np.degrees(rotations.angle(done.rotation, cmu_walk.rotation))

@@ -6,6 +6,7 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated
 
+import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.console import names, progress, say
@@ -14,6 +15,7 @@ from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
 
 SHOWN = 4  # losses, of many
+STILL = 1e-3  # metres
 
 
 def recover(
@@ -92,6 +94,8 @@ def recover(
     others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
     if not (done.report.gaps or done.report.moments):
         fix = "Name joints that are lost for longer: --joints LeftArm."
+        if len(clip) > 1 and float(np.ptp(clip.translation, axis=0).max()) < STILL:
+            fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
         raise RequestError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose, spikes, or jumps away and back within a second",

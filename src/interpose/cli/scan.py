@@ -21,6 +21,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         file: the clip (.bvh, .npz, .amc).
         json: print JSON for other programs.
     """
+    from interpose.finish.feet import legs
     from interpose.observation.scan import scan, to_gaps
 
     clip = reading.load(file)
@@ -60,5 +61,5 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
-    if len(to_gaps(found)) + len(dropped) < len(found):
+    if len(to_gaps(found)) + len(dropped) < len(found) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")

@@ -136,7 +136,9 @@ def _shaken(clip: Clip, free: Observation) -> float:
         return 0.0
     places = clip.positions()
     shaken = float(deviation(places[:, [hips]])[0])
-    own = np.delete(deviation(places - places[:, [hips]]), hips)
+    # What does not hang from the hips, as a root that stays, trembles against them as they do themselves.
+    below = [joint for joint in range(len(clip.skeleton)) if hips in clip.skeleton.ancestors(joint)]
+    own = deviation(places[:, below] - places[:, [hips]])
     return shaken if shaken > max(TREMBLES, ALIKE * own.max()) else 0.0
 
 

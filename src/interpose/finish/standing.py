@@ -24,6 +24,7 @@ SLOW, HURRY, HIGH = 0.5, 0.1, 0.05
 GOES_ON, FLOOR, FIXED = 1.0, 0.01, 1e6
 RESTS = 1e-6  # what it counts that a body stays where it is, where nothing else says anything
 GRAVITY = 9.81  # metres per second squared
+TORN = 5.0  # metres a second, of all joints in the mean: no motion does that
 PULL = 2.0  # times gravity: nobody comes down faster, as far as can be told
 ROUNDS = 40  # at most, of finding what stands, and where that puts the body
 # Metres a frame that what stands moves at 30 fps, as far as noise on places counts beside it.
@@ -32,10 +33,10 @@ STEADY = 0.004
 
 def alone(known: Observation, clip: Clip) -> np.ndarray:
     """(F,) where the place of the body is lost and all turns between it and the feet are known; nowhere where
-    there are no feet."""
+    there are no feet, or hardly a frame."""
     skeleton, hips = clip.skeleton, hips_of(clip.skeleton)
     chains, legs = {hips, *skeleton.ancestors(hips)}, feet.legs(skeleton)
-    if not legs:
+    if not legs or len(clip) < 3:
         return np.zeros(len(known.rotation), bool)
     for leg in legs:
         chains |= {leg.thigh, leg.knee, leg.ankle, *skeleton.ancestors(leg.thigh)}
@@ -64,11 +65,11 @@ def steadied(clip: Clip, noise: float) -> Clip:
     """The motion of which all turns are known and the place of the body is noisy, by `noise` metres along an
     axis: near where it is, and as what it stands on says."""
     carrier = _carrier(clip)
-    if carrier is None or noise <= 0:
+    if carrier is None or noise <= 0 or len(clip) < 3:
         return clip
     full = Observation.full(clip)
     joints = _supports(full, np.ones(len(clip), bool), clip)
-    weight = np.full(len(clip), (STEADY * 30 / clip.fps / noise) ** 2)
+    weight = np.full(len(clip), 30 / clip.fps * (STEADY / noise) ** 2)
     return _placed(clip, carrier, joints, weight, False)
 
 
@@ -86,7 +87,7 @@ def _placed(clip: Clip, carrier: int, joints: list[int], trusted: np.ndarray, le
         trusted: (F,) how much the place counts where it is.
         level: whether the floor is.
     """
-    if not joints or len(clip) < 3:
+    if not joints:
         return clip
     turned, placed = clip.kinematics()
     hips, grown = hips_of(clip.skeleton), feet.size(clip.skeleton)
@@ -94,7 +95,8 @@ def _placed(clip: Clip, carrier: int, joints: list[int], trusted: np.ndarray, le
     heights = against[..., 1]
     slow = SLOW * grown / clip.fps
     floor = _floor(root[:, None] + against, trusted > 0, slow) if level else None
-    stands = _begun(root, against, trusted >= FIXED, grown * GRAVITY / clip.fps**2)
+    falls, torn = grown * GRAVITY / clip.fps**2, grown * TORN / clip.fps
+    stands = _begun(root, against, trusted >= FIXED, falls, torn)
     for _ in range(ROUNDS):
         path = _carried(root, against, stands, trusted, floor, clip.fps, grown)
         pace = np.linalg.norm(np.gradient(path[:, None] + against, axis=0), axis=-1)
@@ -114,12 +116,15 @@ def _supports(known: Observation, lost: np.ndarray, clip: Clip) -> list[int]:
     return [j for j, chain in above.items() if hips in (j, *chain) and all(whole[k] for k in chain)]
 
 
-def _begun(root: np.ndarray, against: np.ndarray, known: np.ndarray, falls: float) -> np.ndarray:
+def _begun(root: np.ndarray, against: np.ndarray, known: np.ndarray, falls: float, torn: float) -> np.ndarray:
     """(F - 1, n) what stands from each frame to the next, to begin with: the lowest joint, but in the air.
 
     The floor pushes and does not pull: what would hold a body back on its way up has left it, and the body
     flies until it is as low as it was there. Arguments as in `_carried`; `falls` in metres a frame squared.
+    Where joints move by more than `torn` metres a frame against the hips, in the mean, two poses have nothing
+    to do with each other, as a rest pose before the motion.
     """
+    apart = np.linalg.norm(np.diff(against, axis=0), axis=-1).mean(axis=1) > torn
     steps, heights = -np.diff(against, axis=0), against[..., 1]
     lowest = (heights[1:] + heights[:-1]).argmin(axis=1)
     stands = np.zeros(steps.shape[:2], bool)
@@ -130,11 +135,13 @@ def _begun(root: np.ndarray, against: np.ndarray, known: np.ndarray, falls: floa
         if known[i + 1] and known[i]:
             step = root[i + 1] - root[i]
             flies = bool(abs(step[1] - flown[1]) < falls and pace[1] != 0)
+        elif apart[i]:
+            step, flies, floor = np.zeros(3), False, place[1] + heights[i + 1].min()
         elif not flies and step[1] < pace[1] - PULL * falls:
             flies, floor = True, place[1] + heights[i].min()
         elif flies and place[1] + flown[1] + heights[i + 1].min() < floor:
             flies = False
-        stands[i, joint] = not flies
+        stands[i, joint] = not (flies or apart[i])
         pace = flown if flies else step
         place = root[i + 1] if known[i + 1] else place + pace
         if known[i + 1]:

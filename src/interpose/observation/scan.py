@@ -110,7 +110,10 @@ def stuck(clip: Clip) -> list[Finding]:
     if len(clip) <= 2:
         return []
     turned, moved = _steps(clip, Observation.full(clip))
-    return [one for one in _frozen(clip, turned, moved, 0) if one.kind == "frozen position"]
+    odd = {one.start for one in _strays(clip, turned)}
+    first, last = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
+    found = _frozen(clip, turned[first : last - 1], moved[first : last - 1], first)
+    return [one for one in found if one.kind == "frozen position"]
 
 
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
