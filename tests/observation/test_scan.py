@@ -94,6 +94,16 @@ def test_a_frozen_position_is_found_and_is_no_gap():
     assert to_gaps(found) == []
 
 
+@pytest.mark.parametrize("part", [slice(0, 12), slice(108, 120)])
+def test_a_body_that_stops_dead_at_an_end_is_found(part):
+    """There is no jump to tell it: it never goes on."""
+    clip = motion()
+    translation = clip.translation.copy()
+    translation[part] = translation[part.stop if part.start == 0 else part.start - 1]
+    (found,) = scan(clip.with_motion(clip.rotation, translation))
+    assert spans([found]) == [("frozen position", ("hips",), part.start, part.stop)]
+
+
 def test_standing_still_within_the_noise_of_capture_is_no_finding():
     clip = motion()
     rotation = rotations.multiply(

@@ -36,6 +36,8 @@ OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
 # decimals stand still for long.
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
+# Metres a second from which no body comes to stand, to the last digit, from one frame to the next.
+PACE = 0.3
 # Kinds of findings that are no gaps.
 NO_GAPS = ("frozen position", "lost")
 
@@ -73,7 +75,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose, jump or not.
-    - "frozen position": the same for a root, or hips, whose position stands still while the pose does not.
+    - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
+      that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
 
@@ -226,7 +229,11 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     for column in walking.tolist():
         steps = moved[:, column]
         for run in _runs(stopped[:, column] & ~whole, steps, JUMP_WAY):
-            if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
+            beside = np.nanmax(
+                [*steps[max(run.start - 1, 0) : run.start], *steps[run.stop : run.stop + 1], 0.0]
+            )
+            stopped_dead = beside * clip.fps > PACE and run.stop - run.start >= shortest
+            if stopped_dead or _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[placed(clip)[column]],), run)
     return found
 
