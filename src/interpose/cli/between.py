@@ -123,7 +123,7 @@ def _blocked(
         here = (poses[met], 0) if met else (before, last)
         count, why = plausible_length(*here, beside, moment)
         count += met
-        said = f"{count} frames: {why}" + (f" after the anchor at {met}" if met else "")
+        said = f"{count} frame{'s' * (count > 1)}: {why}" + (f" after the anchor at {met}" if met else "")
     elif frames.isdecimal() and int(frames) > 0:
         count = int(frames)
     else:
