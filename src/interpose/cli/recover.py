@@ -78,12 +78,6 @@ def recover(
     clip = reading.load(file)
     gap = range_of(frames, clip, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
-    if place and chosen:
-        raise RequestError(
-            "--joints and --place cannot be recovered at once",
-            "feet tell the place only where all turns are known",
-            "Recover the joints first, and then the place.",
-        )
     for name in chosen or ():
         clip.skeleton.index(name)
     outputs = Outputs.choose(file, output, "recovered", player)
