@@ -40,8 +40,8 @@ def between(
     Keys are frames of one file, or poses of several: then the motion begins
     with --start, --frames new frames follow, and --target is the last, on the
     body of --start. What lies between the keys of a file has no influence; what
-    lies before the first and after the last one stays as it is. Writes the clip and a report
-    beside the input: keys.between.bvh and keys.between.json.
+    lies before the first and after the last one stays as it is. Writes the clip
+    and a report beside the input: keys.between.bvh and keys.between.json.
 
     Try:
       interpose between keys.bvh --keys 0,30,75

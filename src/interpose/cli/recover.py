@@ -15,7 +15,6 @@ from interpose.cli.reading import Reading, split_names
 from interpose.errors import RequestError
 
 SHOWN = 4  # losses, of many
-STILL = 1e-3  # metres
 
 
 def recover(
@@ -68,6 +67,7 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.observation import Gap
     from interpose.observation.scan import NO_GAPS, scan
+    from interpose.skeletons.carrier import STILL
 
     chosen = split_names(joints) if joints else None
     if chosen is not None and not chosen:

@@ -162,8 +162,9 @@ def complete(
     opinion, error = _opinion(raw, known, spans)
     if not isinstance(method, Layer):
         opinion = _carried(opinion, hidden, known)
+        lost = alone(known, hidden)
         for span in spans:
-            if alone(known, hidden)[span.start : span.stop].any():
+            if lost[span.start : span.stop].any():
                 span.notes.append((span.start, span.stop - 1, "what the body stands on tells where it is"))
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
