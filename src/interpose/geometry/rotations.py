@@ -28,19 +28,20 @@ _MATRIX = [
 ]
 MATRIX = table("wxyz", "wxyz", *_MATRIX[0], *_MATRIX[1], *_MATRIX[2])
 COLUMNS = table("wxyz", "wxyz", *(_MATRIX[row][column] for column in (0, 1) for row in range(3)))
-# A matrix with the rows abc, def, ghi: its product with a vector; four times each component of its quaternion
-# squared; and four times its quaternion times the component that is asked for ("o" is the number one).
+# A matrix with the rows abc, def, ghi times a vector.
 APPLY = table("abcdefghi", "xyz", "ax+by+cz", "dx+ey+fz", "gx+hy+iz")
-SQUARES = table("oaei", "o", "oo+ao+eo+io", "oo+ao-eo-io", "oo-ao+eo-io", "oo-ao-eo+io")
-TIMES = table(
-    "wxyz",
-    "oabcdefghi",
-    "wo+wa+we+wi+xh-xf+yc-yg+zd-zb",
-    "wh-wf+xo+xa-xe-xi+yb+yd+zc+zg",
-    "wc-wg+xb+xd+yo-ya+ye-yi+zf+zh",
-    "wd-wb+xc+xg+yf+yh+zo-za-ze+zi",
+
+# Four times each component of its quaternion times each other, but for the one that squares have besides.
+_NUMBERS, _, _SUMS = table(
+    *("abcdefghi", "o"),
+    *("ao+eo+io", "ho-fo", "co-go", "do-bo"),
+    *("ho-fo", "ao-eo-io", "bo+do", "co+go"),
+    *("co-go", "bo+do", "eo-ao-io", "fo+ho"),
+    *("do-bo", "co+go", "fo+ho", "io-ao-eo"),
 )
-COMPONENTS = Constant(np.arange(4))
+PRODUCTS, SQUARES = Constant(_NUMBERS.values @ _SUMS.values), Constant(np.eye(4).ravel())
+# Of those sixteen, whose row each is in; and sums over the rows.
+ROW, ROWS = Constant(np.arange(16) // 4), Constant(np.tile(np.eye(4), (4, 1)))
 
 
 def identity(*shape: int, like: Array = None) -> Array:
@@ -58,8 +59,8 @@ def identity(*shape: int, like: Array = None) -> Array:
 def normalize(q: Array) -> Array:
     """The unit vector along `q` (..., n); zero vectors stay zero."""
     xp = array_namespace(q)
-    square = xp.sum(q * q, axis=-1, keepdims=True)
-    return q / xp.sqrt(xp.where(square > 0, square, 1.0))
+    square = xp.sum(q * q, axis=-1)
+    return q / xp.sqrt(xp.where(square > 0, square, 1.0))[..., None]
 
 
 def multiply(a: Array, b: Array) -> Array:
@@ -148,11 +149,12 @@ def from_matrix(m: Array) -> Array:
     """
     xp = array_namespace(m)
     rows = xp.reshape(m, (*m.shape[:-2], 9))
-    one = xp.ones_like(rows[..., :1])
-    squares = bilinear(xp.concat([one, rows[..., ::4]], axis=-1), one, SQUARES)
-    best = xp.argmax(squares, axis=-1)[..., None] == COMPONENTS.beside(m)
-    q = normalize(bilinear(xp.astype(best, m.dtype), xp.concat([one, rows], axis=-1), TIMES))
-    return q * xp.where(q[..., :1] < 0, -one, one)
+    # Four times each component times each other: any row is the quaternion, times one of its components.
+    products = xp.matmul(rows, PRODUCTS.beside(m)) + SQUARES.beside(m)
+    best = xp.argmax(products[..., ::5], axis=-1)[..., None] == ROW.beside(m)
+    q = xp.matmul(xp.astype(best, m.dtype) * products, ROWS.beside(m))
+    length = xp.sqrt(xp.sum(q * q, axis=-1))  # at least 1: the four squares are 4 together
+    return q / xp.where(q[..., 0] < 0, -length, length)[..., None]
 
 
 def to_6d(q: Array) -> Array:

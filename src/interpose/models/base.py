@@ -118,27 +118,25 @@ def complete_columns(
     velocity but the line's. At open ends the value is held, after its velocity has died away.
     """
     frame = torch.arange(values.shape[1], device=values.device)
-    since, until = ((d.clamp(min=0)).to(values.dtype)[..., None] for d in (frame - last, first - frame))
-    length = (first - last).to(values.dtype)[..., None]
+    since, until = (d.clamp(min=0).to(values.dtype) for d in (frame - last, first - frame))
+    length = (first - last).to(values.dtype)
     share = torch.where(length > 0, since / length.clamp(min=1.0), (until > 0).to(values.dtype))
-    held = known.to(values.dtype)[..., None]
-    both = held[:, 1:] * held[:, :-1]
+    held = known.to(values.dtype)
+    both = (held[:, 1:] * held[:, :-1])[..., None]
     steps = torch.cat([both * (values[:, 1:] - values[:, :-1]), both], dim=2)
     # Values, the step to or from the frame beside, and whether that is known, too.
-    parts = [values.shape[2]] * 2 + [1]
-    pad = nn.functional.pad
-    a, before, has_before = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=2), last).split(parts, 2)
-    b, after, has_after = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=2), first).split(parts, 2)
-    line = a + share * (b - a)
+    size, pad = values.shape[2], nn.functional.pad
+    here = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=2), last)
+    there = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=2), first)
+    a, b = here[..., :size], there[..., :size]
     if reach is None:
-        return line
-    slope = (b - a) / length.clamp(min=1.0)
-    leave, meet = has_before * (before - slope), has_after * (after - slope)
-    return (
-        line
-        + leave * (since * (1 - share) * (1 - share) * torch.exp(-since / reach))
-        - meet * (until * share * share * torch.exp(-until / reach))
-    )
+        return a + share[..., None] * (b - a)
+    # How far each velocity carries, and how much less of the line's way that leaves.
+    leave = here[..., -1] * since * (1 - share) * (1 - share) * torch.exp(-since / reach)
+    meet = there[..., -1] * until * share * share * torch.exp(-until / reach)
+    share = share + (meet - leave) / length.clamp(min=1.0)
+    before, after = here[..., size:-1], there[..., size:-1]
+    return a + share[..., None] * (b - a) + leave[..., None] * before - meet[..., None] * after
 
 
 def room(known: Tensor, last: Tensor, first: Tensor) -> Tensor:
@@ -160,12 +158,6 @@ def room(known: Tensor, last: Tensor, first: Tensor) -> Tensor:
 def turned_by(values: Tensor, matrix: Tensor) -> Tensor:
     """Vectors (B, ..., 3), or several of them one after the other (B, ..., 3 n), as rows times (B, 3, 3)."""
     return (values.reshape(values.shape[0], -1, 3) @ matrix).reshape(values.shape)
-
-
-def mixed(chosen: Tensor, a: Tensor, b: Tensor) -> Tensor:
-    """`a` (..., n) where `chosen` (...), else `b`, by sums: in graphs a choice is slow."""
-    share = chosen.to(a.dtype)[..., None]
-    return share * a + (1 - share) * b
 
 
 class Block(nn.Module):
@@ -321,14 +313,14 @@ class Base(nn.Module):
         placed_hips = held[..., 0] & held[..., COUNT]
         asked = torch.cat([held.transpose(1, 2), placed_hips[:, None], whole[:, None]], dim=1)
         last, first = (found.unflatten(0, (batch, -1)) for found in neighbours(asked.flatten(0, 1)))
-        reach = REACH.beside(flat).repeat(batch)[:, None, None] if self.config.velocities else None
+        reach = REACH.beside(flat).repeat(batch)[:, None] if self.config.velocities else None
         before, after = (around[:, : COUNT + 1].flatten(0, 1) for around in (last, first))
         done = complete_columns(flat, held.transpose(1, 2).flatten(0, 1), before, after, reach)
         done = done.unflatten(0, (batch, COUNT + 1)).transpose(1, 2)
         # Joints that are never known stand as in the T-pose.
         never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
         turned = rotations.from_6d(torch.where(never, REST.beside(done), done[:, :, :COUNT]))
-        turned = mixed(held[:, :, :COUNT], local, turned)
+        turned = torch.where(held[:, :, :COUNT, None], local, turned)
         motion = Motion(turned, done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
         if self.config.near:
@@ -407,7 +399,7 @@ class Base(nn.Module):
             columns = columns + REST.beside(columns) - begin
         turned = rotations.from_6d(turned_by(begin + share * columns, start.back))
         turned = kinematics.local_rotations(turned, PARENTS)
-        turned = mixed(exactly[..., :COUNT], local, turned)
+        turned = torch.where(exactly[..., :COUNT, None], local, turned)
         way = turned_by(moved, start.back)
         if not config.residual:
             way = way + start.origin[:, None] - start.motion.root
