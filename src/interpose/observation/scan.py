@@ -25,6 +25,8 @@ LIFELESS = 1e-3
 LIVELY = 1.0
 # A joint that stands still in more than this share of all steps has no data either: rest poses turn it.
 IDLE = 0.9
+# So many joints do not stop turning at once by themselves.
+MANY = 5
 # Frozen runs shorter than this many seconds are as good as noise; at least 3 frames.
 SHORTEST = 0.1
 # A joint that stands still without a jump at either end may be at the limit of a hinge: only after a second.
@@ -74,7 +76,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       for at least .1 s (and 3 frames) with a jump at one end; or for a second in which the joint would
       usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
       write it as their rest pose. When everything that moves stands still at once, the root's position
-      included, it is one finding of the whole pose, jump or not.
+      included, it is one finding of the whole pose, jump or not; of all joints that turn, when the position
+      goes on.
     - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
       that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
@@ -212,14 +215,18 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         if run.stop - run.start >= shortest:
             add("frozen", None, run)
 
+    # Joints without data but for some steps, like the fingers of many files, are left out.
+    lively = [joint for joint in alive.tolist() if _lively(still[:, joint] & ~whole, still[:, joint])]
     together: dict[Run, list[int]] = {}
-    for joint in alive.tolist():
+    turnless = still[:, lively].all(axis=1) & ~whole & (len(lively) >= MANY)
+    for run in _runs(turnless, turned[:, lively].max(axis=1, initial=0.0), JUMP_TURN):
+        if run.stop - run.start >= shortest:
+            together[run] = lively
+        else:
+            turnless[run.start : run.stop] = False
+    for joint in lively:
         steps = turned[:, joint]
-        pauses = list(_runs(still[:, joint] & ~whole, steps, JUMP_TURN))
-        longest = max((run.stop - run.start for run in pauses), default=0)
-        if 2 * longest >= len(steps) or still[:, joint].mean() > IDLE:
-            continue  # no data but for some steps, like the fingers of many files
-        for run in pauses:
+        for run in _runs(still[:, joint] & ~whole & ~turnless, steps, JUMP_TURN):
             value = clip.rotation[first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
@@ -268,6 +275,12 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
         for run in runs(column):
             together.setdefault(run, []).append(name)
     return [Finding("lost", tuple(names), *run, "jumps away and back") for run, names in together.items()]
+
+
+def _lively(paused: np.ndarray, still: np.ndarray) -> bool:
+    """Whether a joint that is `still` in some steps, and alone in those `paused`, has data throughout."""
+    longest = max((stop - start for start, stop in runs(paused)), default=0)
+    return 2 * longest < len(paused) and bool(still.mean() <= IDLE)
 
 
 def _suspicious(run: Run, fps: float, pace: float) -> bool:
