@@ -85,6 +85,19 @@ def test_frozen_runs_at_the_ends(joints):
     assert spans(scan(hold(motion(), 80, 120, joints))) == [("frozen", names, 80, 120)]
 
 
+@pytest.mark.parametrize("part", [slice(0, 5), slice(60, 80), slice(-5, None)])
+def test_turns_that_all_stop_while_the_body_goes_on_are_one_finding(cmu_walk, part):
+    walk = cmu_walk.slice(1, len(cmu_walk))  # the first frame of CMU's files is a rest pose
+    frames = range(len(walk))[part]
+    held = frames[-1] if part.start == 0 else frames[0] - 1
+    rotation = walk.rotation.copy()
+    rotation[part] = rotation[held]
+    (found,) = (one for one in scan(walk.with_motion(rotation, walk.translation)) if one.kind == "frozen")
+    assert [*range(found.start, found.stop)] == [frame for frame in frames if frame != held]
+    assert len(found.joints) >= 20
+    assert "Hips" in found.joints
+
+
 def test_a_frozen_position_is_found_and_is_no_gap():
     clip = motion()
     translation = clip.translation.copy()
