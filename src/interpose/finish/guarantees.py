@@ -5,20 +5,20 @@ Precedence when they collide: observed values, then bones, then pins, then seams
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, measures, notes, penetration, pins, seams
+from interpose.finish import feet, jumps, measures, notes, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.solve import solve, solve_error
+from interpose.finish.span import Span, write
 from interpose.finish.standing import alone, stood
 from interpose.finish.windows import grow
 from interpose.formats import held
@@ -38,57 +38,11 @@ FAR = 1.5
 FURTHER = 1.5
 # Frames solved at once.
 CHUNK = 4096
-# Metres a second squared by which velocities may jump inside of any gap: what a person does who sets off.
-SETS_OFF = 20.0
-# Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do; the
-# share of a gap beyond which that is no mending; and the jump (metres a second squared) that is mended even
-# where nothing tells how the motion itself jumps. Between poses that face away from each other networks may
-# turn all at once.
-MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
-# Rounds in which velocity jumps above the limit are softened, and the change of velocity (metres a second)
-# beyond which they are not: that is a jump in value.
-ROUNDS, KINK = 12, 8.0
+# Rounds in which velocity jumps above the limit are softened.
+ROUNDS = 12
 # A simpler method takes over where it pops by less than this share of what the method does: the hand of a
 # body that falls jumps with either.
 LESS = 0.9
-
-
-@dataclass
-class _Span:
-    """A range of frames in which something is missing, and what becomes of it.
-
-    `problem` says why the method's own motion does not do; it is `hopeless` if it should not be used at all.
-    Each of the notes speaks of some frames, first to last.
-    """
-
-    start: int
-    stop: int
-    method: str
-    problem: str | None = None
-    hopeless: bool = False
-    notes: list[tuple[int, int, str]] = field(default_factory=list)
-
-    def told(self, gap: Gap) -> list[str]:
-        """What the notes say of one of its gaps, the known frames beside it included."""
-        return [text for first, last, text in self.notes if first <= gap.stop and last >= gap.start - 1]
-
-    def around(self, frames: int, margin: int) -> tuple[int, int, tuple[int, int]]:
-        """The frames lo to hi - 1 around it, and its own range counted from lo."""
-        lo, hi = max(0, self.start - margin), min(frames, self.stop + margin)
-        return lo, hi, (self.start - lo, self.stop - lo)
-
-
-@dataclass(frozen=True)
-class _Bounds:
-    """How far velocities may jump, in metres per frame squared: at seams, inside of gaps, and what the
-    observed motion itself does."""
-
-    seam: float
-    peak: float
-
-    @property
-    def calm(self) -> float:
-        return self.peak / seams.OWN_PEAKS
 
 
 def complete(
@@ -149,7 +103,7 @@ def complete(
             clip, lambda: Raw(clip), np.zeros(known.rotation.shape, np.int8), Report(method.name)
         )
 
-    spans = [_Span(start, stop, method.name) for start, stop in runs(~known.frames)]
+    spans = [Span(start, stop, method.name) for start, stop in runs(~known.frames)]
     for gap in gaps:
         if reason := method.refuses(hidden, gap):
             there = replace(gap, start=gap.start + first, stop=gap.stop + first)
@@ -169,16 +123,16 @@ def complete(
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
-    bounds = None if limit is None else _Bounds(limit, _peak_limit(hidden, known, limit))
-    before = {gap: _jump(current, known, _at(gap), seams.seam_jumps) for gap in gaps}
+    bounds = None if limit is None else jumps.Bounds(limit, jumps.peak_limit(hidden, known, limit))
+    before = {gap: jumps.largest(current, known, jumps.beside(gap), seams.seam_jumps) for gap in gaps}
     unheld: dict[Gap, tuple[float, float]] = {}
     mended: dict[int, list[tuple[int, int]]] = {}
 
-    def settle(chosen: list[_Span], source: Clip) -> None:
+    def settle(chosen: list[Span], source: Clip) -> None:
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
             _fade(current, source, hidden, known, span)
-            places = _mend(current, known, span, bounds)
+            places = jumps.mend(current, known, span, bounds)
             if source is opinion:
                 mended[span.start] = places
         for span in chosen:
@@ -187,14 +141,14 @@ def complete(
                 _plant(current, known, span, bounds, raw.stands if source is opinion else None)
         for _ in range(ROUNDS):
             for span in chosen:
-                _soften(current, known, span, limit)
+                jumps.soften(current, known, span, limit)
 
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
-        excess, above, _ = _excess(current, known, span, bounds, first)
+        excess, above, _ = jumps.excess(current, known, span, bounds, first)
         span.problem = span.problem or (above if excess > 1 else None)
     failed = [s for s in spans if s.problem and (s.hopeless or fallback.name != method.name)]
     if failed:
@@ -204,17 +158,17 @@ def complete(
         second = held(_carried(second, hidden, known), clip.source)
         merged, own = _merge(second, hidden, known), _merge(current, hidden, known)
         for span in failed:
-            _write(current, merged, span.start, (span.start, span.stop))
+            write(current, merged, span.start, (span.start, span.stop))
         settle(failed, second)
         for span in failed:
             # Where the simpler method pops hardly less, there is no reason to lose the motion; nor where it
             # has only the rest pose to say.
-            excess, other = (_excess(clip, known, span, bounds, first)[0] for clip in (own, current))
+            excess, other = (jumps.excess(clip, known, span, bounds, first)[0] for clip in (own, current))
             blank = isinstance(fallback, Spline) and any(
                 notes.never(known, gap, clip.skeleton.names) for gap in gaps if _of(spans, gap) is span
             )
             if not span.hopeless and (blank or other > max(1.0, LESS * excess)):
-                _write(current, own, span.start, (span.start, span.stop))
+                write(current, own, span.start, (span.start, span.stop))
                 continue
             span.method = fallback.name
             span.notes.append(
@@ -227,7 +181,7 @@ def complete(
         for start, stop in mended.get(span.start, ()) if span.method == method.name else ():
             which = f"frames {first + start} to {first + stop - 1}"
             span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
-        excess, above, where = _excess(current, known, span, bounds, first)
+        excess, above, where = jumps.excess(current, known, span, bounds, first)
         if excess > 1:
             span.notes.append((where, where, f"flagged: {above}"))
 
@@ -415,7 +369,7 @@ def _trusted(clip: Clip, observation: Observation) -> Observation:
     return Observation(observation.rotation & trusted, translation)
 
 
-def _of(spans: list[_Span], gap: Gap) -> _Span:
+def _of(spans: list[Span], gap: Gap) -> Span:
     return next(span for span in spans if span.start <= gap.start and gap.stop <= span.stop)
 
 
@@ -429,7 +383,7 @@ def _second(
     return fallback.complete(hidden, observation, seed)
 
 
-def _opinion(raw: Raw, known: Observation, spans: list[_Span]) -> tuple[Clip, np.ndarray | None]:
+def _opinion(raw: Raw, known: Observation, spans: list[Span]) -> tuple[Clip, np.ndarray | None]:
     """What the method says as rotations, also of the observed frames beside gaps, and how far (F,) metres the
     solve is from its positions, where it speaks positions."""
     if raw.positions is None:
@@ -469,37 +423,7 @@ def _carried(opinion: Clip, hidden: Clip, known: Observation) -> Clip:
     return opinion.with_motion(opinion.rotation, stood(_merge(opinion, hidden, known), known).translation)
 
 
-def _jump(
-    clip: Clip,
-    known: Observation,
-    frames: np.ndarray,
-    jumps: Callable[[Clip, Observation, np.ndarray], np.ndarray] = seams.jumps,
-) -> float | None:
-    """The largest velocity jump at some frames, in metres per frame squared; None where there are none."""
-    frames = frames[(frames > 0) & (frames < len(clip) - 1)]
-    if frames.size == 0:
-        return None
-    return float(np.linalg.norm(jumps(clip, known, frames), axis=-1).max())
-
-
-def _at(gap: Gap) -> np.ndarray:
-    return np.array([gap.start - 1, gap.stop])
-
-
-def _seams(current: Clip, known: Observation, span: _Span) -> float | None:
-    """The largest velocity jump at the seams of a span."""
-    edges = seams.edges(known, current.translated, (span.start, span.stop))
-    return _jump(current, known, edges, seams.seam_jumps)
-
-
-def _write(current: Clip, source: Clip, at: int, inner: tuple[int, int]) -> None:
-    """Put the frames `inner` of `source` into `current`, from frame `at` on."""
-    part = slice(at, at + inner[1] - inner[0])
-    current.rotation[part] = source.rotation[slice(*inner)]
-    current.translation[part] = source.translation[slice(*inner)]
-
-
-def _lost(opinion: Clip, hidden: Clip, known: Observation, span: _Span) -> str | None:
+def _lost(opinion: Clip, hidden: Clip, known: Observation, span: Span) -> str | None:
     """Why the method's motion cannot be eased into the observed one, if so."""
     lo, hi, inner = span.around(len(hidden), 2)
     _, apart = seams.difference(opinion.slice(lo, hi), hidden.slice(lo, hi), known.slice(lo, hi), inner)
@@ -508,109 +432,27 @@ def _lost(opinion: Clip, hidden: Clip, known: Observation, span: _Span) -> str |
     return None
 
 
-def _peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
-    """How far a joint's velocity may jump inside a gap, in metres per frame squared.
-
-    Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked. What no
-    body does is a glitch of the file, and no measure for anything.
-    """
-    own = seams.own_jumps(hidden, known)
-    own = own[own < TORN / hidden.fps**2]
-    peak = seams.OWN_PEAKS * float(own.max(initial=0.0))
-    return max(seams.PEAKS * limit, peak, SETS_OFF / hidden.fps**2)
-
-
-def _excess(
-    current: Clip, known: Observation, span: _Span, bounds: _Bounds | None, first: int
-) -> tuple[float, str, int]:
-    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
-    words, and at which frame; words call the first frame `first`."""
-    # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
-    bounds = bounds or _Bounds(math.inf, TORN / current.fps**2)
-    found, names = [(0.0, "", span.start)], current.skeleton.names
-    edges = seams.edges(known, current.translated, (span.start, span.stop))
-    inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
-    for frames, jumps, most, where in (
-        (edges, seams.seam_jumps, bounds.seam, "at a seam"),
-        (inside, seams.jumps, bounds.peak, "inside the gap"),
-    ):
-        if frames.size:
-            size = np.linalg.norm(jumps(current, known, frames), axis=-1)
-            row, joint = np.unravel_index(size.argmax(), size.shape)
-            jump, frame = float(size[row, joint]), int(frames[row])
-            words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}"
-            found.append((jump / most, f"{words} ({names[joint]}, frame {first + frame})", frame))
-    return max(found)
-
-
-def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: _Span) -> None:
+def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: Span) -> None:
     """Fade what the source says differently of the observed frames; nothing, if it repeats them."""
     lo, hi, inner = span.around(len(hidden), seams.reach(hidden.fps))
     base, seen = hidden.slice(lo, hi), known.slice(lo, hi)
     raw = source.slice(lo, hi)
     if seams.difference(raw, base, seen, inner)[0] > seams.EXACT:
-        _write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
-
-
-def _mend(current: Clip, known: Observation, span: _Span, bounds: _Bounds | None) -> list[tuple[int, int]]:
-    """Where velocities jump further inside of a span than they may, let a spline lead over the place.
-
-    Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
-    """
-    most = TORN / current.fps**2 if bounds is None else bounds.peak
-    lo, hi, (start, stop) = span.around(len(current), 3)
-    # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
-    frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
-    places = np.zeros(len(led), bool)
-    while frames.size:
-        jumps = np.linalg.norm(seams.jumps(led, seen, frames), axis=-1).max(axis=1)
-        if jumps.max() <= most:
-            break
-        led, (first, last) = _led_over(led, seen, (start, stop), int(frames[jumps.argmax()]), most)
-        again = places[first:last].all()
-        places[first:last] = True
-        if again or places.sum() > PATCHED * (stop - start):
-            return []
-    if places.any():
-        _write(current, led, span.start, (start, stop))
-    return [(lo + first, lo + last) for first, last in runs(places)]
-
-
-def _led_over(
-    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: float
-) -> tuple[Clip, tuple[int, int]]:
-    """The clip with a spline around the frame at which velocities jump worst, and over which frames: as few
-    of `inner` as bring the jump below `most`, or else those with which it is least."""
-    found = []
-    for seconds in MENDS:
-        half = max(1, round(seconds * clip.fps))
-        start, stop = max(inner[0], worst - half), min(inner[1], worst + half + 1)
-        free = np.zeros((len(clip), 1), bool)
-        free[start:stop] = True
-        if free.all():
-            break
-        done = Spline().complete(clip, Observation(known.rotation | ~free, known.translation | ~free)).clip
-        jump = _jump(done, known, np.arange(start - 1, stop + 1)) or 0.0
-        found.append((jump, done, (start, stop)))
-        if jump <= most:
-            break
-    if not found:
-        return clip, (worst, worst + 1)
-    return min(found, key=lambda one: one[0])[1:]
+        write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
 
 
 def _plant(
-    current: Clip, known: Observation, span: _Span, bounds: _Bounds | None, stands: np.ndarray | None
+    current: Clip, known: Observation, span: Span, bounds: jumps.Bounds | None, stands: np.ndarray | None
 ) -> None:
     """Hold the feet of a span as firmly as they bear: with jumps that the observed motion has, too, or as
     softly as possible with those that a gap may have at most."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
     loose, seen, frames = current.slice(lo, hi), known.slice(lo, hi), np.arange(*inner)
-    slide, peak = feet.measure(loose, seen, *inner), _jump(loose, seen, frames) or 0.0
+    slide, peak = feet.measure(loose, seen, *inner), jumps.largest(loose, seen, frames) or 0.0
     chosen = None
     for blend in feet.BLENDS:
         held = feet.plant(loose, seen, inner, blend, None if stands is None else stands[lo:hi])
-        slides, jump = feet.measure(held, seen, *inner), _jump(held, seen, frames) or 0.0
+        slides, jump = feet.measure(held, seen, *inner), jumps.largest(held, seen, frames) or 0.0
         if slide is None or slides is None or slides[0] > slide[0]:
             break  # holding feet made them slide: it was about something else than stances
         if bounds is None or jump <= max(bounds.peak, peak):
@@ -618,19 +460,10 @@ def _plant(
         if bounds is None or jump <= max(bounds.calm, peak):
             break
     if chosen is not None:
-        _write(current, chosen, span.start, inner)
+        write(current, chosen, span.start, inner)
 
 
-def _soften(current: Clip, known: Observation, span: _Span, limit: float | None) -> None:
-    jump = _seams(current, known, span)
-    if limit is None or jump is None or not limit < jump < KINK / current.fps:
-        return
-    lo, hi, inner = span.around(len(current), 2)
-    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limit)
-    _write(current, softer, span.start, inner)
-
-
-def _slides(clip: Clip, known: Observation, span: _Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:
+def _slides(clip: Clip, known: Observation, span: Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:
     """Slide and travel of the feet in the gaps of a span, for skeletons that have feet."""
     lo, hi, _ = span.around(len(clip), round(feet.NEARBY * clip.fps))
     inside = [gap for gap in gaps if span.start <= gap.start and gap.stop <= span.stop]
@@ -650,7 +483,7 @@ def _verify(finished: Clip, clip: Clip, known: Observation) -> None:
 
 
 def _provenance(
-    known: Observation, spans: list[_Span], method: str, opinion: Clip, finished: Clip
+    known: Observation, spans: list[Span], method: str, opinion: Clip, finished: Clip
 ) -> np.ndarray:
     """(F, J) codes."""
     missing = ~(known.rotation & known.translation)
@@ -670,11 +503,11 @@ def _report(
     finished: Clip,
     known: Observation,
     gap: Gap,
-    span: _Span,
+    span: Span,
     raw: Raw,
     error: np.ndarray | None,
     before: float | None,
-    bounds: _Bounds | None,
+    bounds: jumps.Bounds | None,
     unheld: tuple[float, float] | None,
     held: tuple[float, float] | None,
     method: str,
@@ -685,7 +518,7 @@ def _report(
     skeleton = finished.skeleton
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
-    after = _jump(finished, known, _at(gap), seams.seam_jumps)
+    after = jumps.largest(finished, known, jumps.beside(gap), seams.seam_jumps)
     alive = None if gap.joints is not None else notes.liveliness(finished, gap)
     glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
@@ -706,7 +539,7 @@ def _report(
         seam_before=_centi(before),
         seam_after=_centi(after),
         seam_limit=_centi(bounds.seam if bounds else None),
-        peak=_centi(_jump(finished, known, np.arange(gap.start, gap.stop))),
+        peak=_centi(jumps.largest(finished, known, np.arange(gap.start, gap.stop))),
         peak_limit=_centi(bounds.peak if bounds else None),
         bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
         foot_slide=held[0] if held else None,
@@ -721,7 +554,7 @@ def _report(
             *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),
             *notes.sunk(finished, known, gap, first),
-            *notes.dull(alive, gap, first, ahead),
+            *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide),
             *notes.doubtful(risk, gap, first, ahead),
             *(notes.scant(known, gap, finished.fps) if networks else ()),

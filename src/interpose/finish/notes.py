@@ -92,15 +92,14 @@ def liveliness(finished: Clip, gap: Gap) -> float | None:
     )
 
 
-def dull(alive: float | None, gap: Gap, first: int, ahead: bool) -> list[str]:
+def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) -> list[str]:
     """A note where a body hardly moves: `alive` as from `liveliness`. What is `ahead` has no end to key."""
     if alive is None or alive >= DULL:
         return []
     if ahead:
-        return [
-            f"flagged: most of it moves {100 * alive:.0f} % as much as the motion before it: a mean of many "
-            "possible motions. --method stmi-gan keeps moving"
-        ]
+        said = f"flagged: most of it moves {100 * alive:.0f} % as much as the motion before it"
+        lively = "--method stmi-gan keeps moving"
+        return [said if method == "stmi-gan" else f"{said}: a mean of many possible motions. {lively}"]
     return [
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
         f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"

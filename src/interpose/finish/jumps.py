@@ -1,0 +1,155 @@
+"""Velocity jumps at the seams of a span and inside of it: how far they may go, and what makes them less."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.finish import seams
+from interpose.finish.span import Span, write
+from interpose.geometry.time import runs
+from interpose.methods.classical import Spline
+from interpose.observation import Gap, Observation
+
+# Metres a second squared by which velocities may jump inside of any gap: what a person does who sets off.
+SETS_OFF = 20.0
+# Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do; the
+# share of a gap beyond which that is no mending; and the jump (metres a second squared) that is mended even
+# where nothing tells how the motion itself jumps. Between poses that face away from each other networks may
+# turn all at once.
+MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
+# The change of velocity (metres a second) beyond which none is softened: that is a jump in value.
+KINK = 8.0
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How far velocities may jump, in metres per frame squared: at seams, inside of gaps, and what the
+    observed motion itself does."""
+
+    seam: float
+    peak: float
+
+    @property
+    def calm(self) -> float:
+        return self.peak / seams.OWN_PEAKS
+
+
+def largest(
+    clip: Clip,
+    known: Observation,
+    frames: np.ndarray,
+    jumps: Callable[[Clip, Observation, np.ndarray], np.ndarray] = seams.jumps,
+) -> float | None:
+    """The largest velocity jump at some frames, in metres per frame squared; None where there are none."""
+    frames = frames[(frames > 0) & (frames < len(clip) - 1)]
+    if frames.size == 0:
+        return None
+    return float(np.linalg.norm(jumps(clip, known, frames), axis=-1).max())
+
+
+def beside(gap: Gap) -> np.ndarray:
+    """The known frames at both ends of a gap."""
+    return np.array([gap.start - 1, gap.stop])
+
+
+def at_seams(current: Clip, known: Observation, span: Span) -> float | None:
+    """The largest velocity jump at the seams of a span."""
+    edges = seams.edges(known, current.translated, (span.start, span.stop))
+    return largest(current, known, edges, seams.seam_jumps)
+
+
+def peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
+    """How far a joint's velocity may jump inside a gap, in metres per frame squared.
+
+    Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked. What no
+    body does is a glitch of the file, and no measure for anything.
+    """
+    own = seams.own_jumps(hidden, known)
+    own = own[own < TORN / hidden.fps**2]
+    peak = seams.OWN_PEAKS * float(own.max(initial=0.0))
+    return max(seams.PEAKS * limit, peak, SETS_OFF / hidden.fps**2)
+
+
+def excess(
+    current: Clip, known: Observation, span: Span, bounds: Bounds | None, first: int
+) -> tuple[float, str, int]:
+    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
+    words, and at which frame; words call the first frame `first`."""
+    # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
+    bounds = bounds or Bounds(math.inf, TORN / current.fps**2)
+    found, names = [(0.0, "", span.start)], current.skeleton.names
+    edges = seams.edges(known, current.translated, (span.start, span.stop))
+    inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
+    for frames, jumps, most, where in (
+        (edges, seams.seam_jumps, bounds.seam, "at a seam"),
+        (inside, seams.jumps, bounds.peak, "inside the gap"),
+    ):
+        if frames.size:
+            size = np.linalg.norm(jumps(current, known, frames), axis=-1)
+            row, joint = np.unravel_index(size.argmax(), size.shape)
+            jump, frame = float(size[row, joint]), int(frames[row])
+            words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}"
+            found.append((jump / most, f"{words} ({names[joint]}, frame {first + frame})", frame))
+    return max(found)
+
+
+def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> list[tuple[int, int]]:
+    """Where velocities jump further inside of a span than they may, let a spline lead over the place.
+
+    Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
+    """
+    most = TORN / current.fps**2 if bounds is None else bounds.peak
+    lo, hi, (start, stop) = span.around(len(current), 3)
+    # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
+    frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
+    places = np.zeros(len(led), bool)
+    while frames.size:
+        jumps = np.linalg.norm(seams.jumps(led, seen, frames), axis=-1).max(axis=1)
+        if jumps.max() <= most:
+            break
+        led, (first, last) = _led_over(led, seen, (start, stop), int(frames[jumps.argmax()]), most)
+        again = places[first:last].all()
+        places[first:last] = True
+        if again or places.sum() > PATCHED * (stop - start):
+            return []
+    if places.any():
+        write(current, led, span.start, (start, stop))
+    return [(lo + first, lo + last) for first, last in runs(places)]
+
+
+def _led_over(
+    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: float
+) -> tuple[Clip, tuple[int, int]]:
+    """The clip with a spline around the frame at which velocities jump worst, and over which frames: as few
+    of `inner` as bring the jump below `most`, or else those with which it is least."""
+    found = []
+    for seconds in MENDS:
+        half = max(1, round(seconds * clip.fps))
+        start, stop = max(inner[0], worst - half), min(inner[1], worst + half + 1)
+        free = np.zeros((len(clip), 1), bool)
+        free[start:stop] = True
+        if free.all():
+            break
+        done = Spline().complete(clip, Observation(known.rotation | ~free, known.translation | ~free)).clip
+        jump = largest(done, known, np.arange(start - 1, stop + 1)) or 0.0
+        found.append((jump, done, (start, stop)))
+        if jump <= most:
+            break
+    if not found:
+        return clip, (worst, worst + 1)
+    return min(found, key=lambda one: one[0])[1:]
+
+
+def soften(current: Clip, known: Observation, span: Span, limit: float | None) -> None:
+    """Bring the jumps at the seams of a span below the limit (metres per frame squared)."""
+    jump = at_seams(current, known, span)
+    if limit is None or jump is None or not limit < jump < KINK / current.fps:
+        return
+    lo, hi, inner = span.around(len(current), 2)
+    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limit)
+    write(current, softer, span.start, inner)
