@@ -65,6 +65,13 @@ def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk):
     assert glides == {"linear": True, "small": False}
 
 
+def test_a_body_that_glides_slowly_between_lone_keys_is_told(cmu_walk):
+    """Nothing around says how it moves; at its pace it does not run."""
+    (said,) = tasks.between(cmu_walk, [10, 60], method="linear").report.gaps
+    (note,) = (note for note in said.notes if "it glides" in note)
+    assert "around" not in note
+
+
 def test_gliding_does_not_depend_on_the_place_nor_on_the_size(cmu_walk):
     pairs = feet.pairs(cmu_walk.skeleton)
     positions = cmu_walk.positions()

@@ -53,6 +53,15 @@ def test_the_body_turns_along_the_way_and_the_ends_stay(cmu_walk, aside):
     assert np.ptp(wanted[middle]) > 0.5, "there is something to turn by"
 
 
+@pytest.mark.parametrize("there", [(0.8, 0.0), (0.0, 0.8), (-0.8, 0.0), (0.0, -0.8)])
+def test_a_way_that_turns_back_does_not_whip_the_body_round(cmu_walk, there):
+    """The direction of a way may turn by more than half a turn within moments."""
+    led = follow(cmu_walk, *GAP, {MIDDLE: cmu_walk.root[MIDDLE, [0, 2]] + there})
+    turn = rotations.multiply(led.rotation[:, 0], rotations.conjugate(cmu_walk.rotation[:, 0]))
+    steps = rotations.angle(turn[1:], turn[:-1])
+    assert np.degrees(steps.max()) * cmu_walk.fps < 205
+
+
 def test_a_path_through_where_it_goes_anyway_changes_nothing(cmu_walk):
     plain = interpose.fill(cmu_walk, GAP, method="spline").clip
     led = interpose.fill(cmu_walk, GAP, method="spline", path={MIDDLE: plain.root[MIDDLE, [0, 2]]}).clip

@@ -555,7 +555,7 @@ def _report(
             *((inside[1],) if inside and inside[1] else ()),
             *notes.sunk(finished, known, gap, first),
             *notes.dull(alive, gap, first, ahead, span.method),
-            *notes.adrift(glide),
+            *notes.adrift(glide, finished, gap),
             *notes.doubtful(risk, gap, first, ahead),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
             *notes.rests(never, span.method),

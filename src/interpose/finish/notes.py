@@ -20,6 +20,8 @@ DULL = 0.33
 # validation performers' real motion none does; of fills by `linear` 15, `spline` 14, `cmib` 5, `cae` 3 do,
 # and by `small` none. Who runs is in the air for a third of the time.
 GLIDES, AIRBORNE = 0.25, 0.35
+# Metres a second, with the usual leg: who is slower walks.
+RUNS = 2.0
 # Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
 # gaps of a second.
 DOUBT = 0.15
@@ -55,9 +57,9 @@ def _deepest(part: Clip, seen: Observation, start: int, gap: Gap) -> tuple[float
     return float(heights[observed].min() - free[frame, joint]), joints[joint], start + int(frame)
 
 
-def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float] | None:
+def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:
     """The share of a gap's frames in which the body travels and no foot stands, and that of known frames
-    around it; None for what is too short, or has no two legs."""
+    around it, None where too few are; None for what is too short, or has no two legs."""
     fps, skeleton = finished.fps, finished.skeleton
     near = round(feet.NEARBY * fps)
     lo, hi = max(0, gap.start - near), min(len(finished), gap.stop + near)
@@ -67,20 +69,22 @@ def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float]
     placed, seen = finished.slice(lo, hi).positions(), known.slice(lo, hi).positions(skeleton)
     found = measures.glides(placed[:, pairs], placed[:, hips], fps, feet.size(skeleton))
     around = seen[:, [*pairs.ravel(), hips]].all(axis=1)
-    # Between lone keys nothing tells whether it runs, and who runs is in the air for a third of the time.
-    usual = found[around].mean() if around.sum() >= fps / 2 else AIRBORNE
-    return float(found[gap.start - lo : gap.stop - lo].mean()), float(usual)
+    usual = float(found[around].mean()) if around.sum() >= fps / 2 else None
+    return float(found[gap.start - lo : gap.stop - lo].mean()), usual
 
 
-def adrift(glide: tuple[float, float] | None) -> list[str]:
+def adrift(glide: tuple[float, float | None] | None, finished: Clip, gap: Gap) -> list[str]:
     """A note where a body glides: `glide` as from `gliding`."""
-    if glide is None or glide[0] - glide[1] <= GLIDES:
+    if glide is None:
         return []
     share, usual = glide
-    return [
-        f"flagged: it glides: in {100 * share:.0f} % of its frames the body travels and no foot stands "
-        f"(around it in {100 * usual:.0f} %)"
-    ]
+    hips = finished.slice(gap.start, gap.stop).positions()[:, hips_of(finished.skeleton)]
+    # Between lone keys its own pace alone tells whether it runs.
+    running = measures.speed(hips, finished.fps).mean() > RUNS * feet.size(finished.skeleton)
+    if share - (usual if usual is not None else AIRBORNE * running) <= GLIDES:
+        return []
+    said = f"flagged: it glides: in {100 * share:.0f} % of its frames the body travels and no foot stands"
+    return [said if usual is None else f"{said} (around it in {100 * usual:.0f} %)"]
 
 
 def liveliness(finished: Clip, gap: Gap) -> float | None:

@@ -25,6 +25,7 @@ SLOW = 0.25
 SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
 FLOOR = np.array([1.0, 0.0, 1.0])
 EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
+FASTEST = np.radians(200)  # a second by which the body is turned besides its own turns: else it turns less
 
 
 def spans(clip: Clip, known: Observation, path: Iterable[int]) -> list[tuple[int, int]]:
@@ -66,11 +67,8 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
     off = [np.zeros(2), *(points[k] - places[k] for k in sorted(points)), np.zeros(2)]
     shift = CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
     old = places[frames]
-    headings, speeds = zip(*(_way(some, clip.fps) for some in (old, old + shift)))
-    # A heading says something only while there is a way, before and after.
-    share = ramp(np.minimum(*speeds) / SLOW - 1)
-    share *= ramp(np.minimum(frames - frames[0], frames[-1] - frames) / (EASE * clip.fps))
-    turn = rotations.about("Y", share * np.angle(np.exp(1j * (headings[1] - headings[0]))))
+    near = np.minimum(frames - frames[0], frames[-1] - frames) / clip.fps
+    turn = rotations.about("Y", _turns(old, old + shift, near, clip.fps))
     inside = clip.slice(start, stop)
     turned, placed = inside.kinematics()
     hips = placed[:, hips_of(clip.skeleton)]
@@ -89,7 +87,22 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
     return clip.with_motion(rotation, translation)
 
 
-def _way(points: np.ndarray, fps: float) -> tuple[np.ndarray, np.ndarray]:
-    """Direction (radians about Y, 0 along Z) and speed (metres a second) of a way (n, 2) in x and z."""
-    step = gaussian_filter1d(np.gradient(points, axis=0) * fps, SMOOTH * fps, axis=0, mode="nearest")
-    return np.arctan2(step[:, 0], step[:, 1]), np.linalg.norm(step, axis=1)
+def _turns(old: np.ndarray, new: np.ndarray, near: np.ndarray, fps: float) -> np.ndarray:
+    """(n,) radians about Y by which a way (n, 2) in x and z turns when it becomes another one; `near` (n,) is
+    how many seconds its ends are away, at which nothing turns."""
+    # Directions as complex numbers, so that a change of 179 degrees is near one of -179.
+    ways = [np.gradient(way, axis=0) @ [1j, 1.0] * fps for way in (old, new)]
+    ways = [_smooth(way, fps) for way in ways]
+    # A direction says something only while there is a way, before and after.
+    share = ramp(np.minimum(*np.abs(ways)) / SLOW - 1)
+    apart = ways[1] * ways[0].conj()
+    change = 1 - share + share * apart / np.maximum(np.abs(apart), 1e-12)
+    turned = np.unwrap(np.angle(_smooth(change, fps)))
+    # No whole turns, and no faster than people turn.
+    turned = ramp(near / EASE) * (turned - 2 * np.pi * np.round(np.median(turned) / (2 * np.pi)))
+    fastest = np.abs(np.diff(turned)).max(initial=0.0) * fps
+    return np.asarray(turned * min(1.0, FASTEST / fastest) if fastest else turned)
+
+
+def _smooth(values: np.ndarray, fps: float) -> np.ndarray:
+    return np.asarray(gaussian_filter1d(values, SMOOTH * fps, axis=0, mode="nearest"))
