@@ -67,7 +67,8 @@ def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk):
 
 def test_a_body_that_glides_slowly_between_lone_keys_is_told(cmu_walk):
     """Nothing around says how it moves; at its pace it does not run."""
-    (said,) = tasks.between(cmu_walk, [10, 60], method="linear").report.gaps
+    poses = tasks.block({0: cmu_walk.slice(10, 11), 50: cmu_walk.slice(60, 61)})
+    (said,) = tasks.between(poses, [0, 50], method="linear").report.gaps
     (note,) = (note for note in said.notes if "it glides" in note)
     assert "around" not in note
 

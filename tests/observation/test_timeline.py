@@ -73,7 +73,7 @@ def test_a_walk_goes_on_in_its_direction_at_its_pace(cmu_walk):
     way, step = b[0] - a[-1], (a[-1] - a[-16]) / 15
     heading = step / np.linalg.norm(step)
     speeds = [np.linalg.norm(p[15] - p[0]) / 15 for p in (a[-16:], b)]
-    assert np.linalg.norm(way) == pytest.approx(30 * np.mean(speeds), rel=0.02)
+    assert np.linalg.norm(way) == pytest.approx(30 * np.mean(speeds), rel=0.06)
     assert way @ heading > 0.99 * np.linalg.norm(way)
     on = (b[15] - b[0]) / np.linalg.norm(b[15] - b[0])
     assert on @ heading > 0.99
@@ -100,10 +100,10 @@ def test_unaligned_clips_stay_where_they_lie(cmu_walk):
 
 
 def test_lengths_are_chosen_with_a_reason(cmu_walk, run):
-    """Running on from a walk takes longer than walking on; nothing takes less than a step."""
+    """Nothing takes less than a step; who walks on does so in step; running on takes longer."""
     walk_on, speed_up = (lay([cmu_walk.slice(10, 65), clip]) for clip in (cmu_walk.slice(140, 200), run))
-    assert len(walk_on.gaps[0]) == 14
-    assert "step" in walk_on.laid[1].why
+    assert 14 <= len(walk_on.gaps[0]) <= 14 + 42, "a stride takes 42 frames"
+    assert "in step" in walk_on.laid[1].why
     assert len(speed_up.gaps[0]) > 25
     assert "pace" in speed_up.laid[1].why
 

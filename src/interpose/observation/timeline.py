@@ -16,6 +16,7 @@ from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn, wrap
 from interpose.geometry.time import resample
+from interpose.observation.gait import in_step
 from interpose.observation.observation import Gap
 from interpose.observation.part import SAME
 from interpose.skeletons import find_humanoid, find_mapping
@@ -158,12 +159,24 @@ def lay(
     for (clip, scale), count in zip(fitted[1:], counts):
         before, start = done[-1], laid[-1].stop
         last, then, why = end(body, before, -1), end(body, clip, 0), ""
-        yaw = float(wrap(np.array(last.course - then.course))) if align else 0.0
-        turned = Placement(yaw).of(clip, carried)
+        step = in_step(body, before, clip) if align and body.mapping.usable else None
+        if step:
+            last, then = (replace(one, velocity=way) for one, way in zip((last, then), step.velocities))
+        yaw = 0.0
+        if align:
+            yaw = step.yaw if step else last.course - then.course
         if count is None and align:
-            count, why = unhurried_length(body, before, turned)
+            turned = Placement(yaw).of(clip, carried)
+            begins = replace(then, velocity=turn(then.velocity, np.array(yaw)))
+            count, why = unhurried_length(last, begins, before, turned)
+            if step:
+                count = step.frames(count + 1) - 1
+                why = f"in step, a stride takes {step.stride / first.fps:.2f} s; at least {why}"
         elif count is None:
             count, why = plausible_length(before, len(before) - 1, clip, 0)
+        if step:
+            yaw += step.rate * (count + 1)
+        yaw = float(wrap(np.array(yaw)))
         placed = ahead(last, then, yaw, (count + 1) / first.fps) if align else Placement()
         held = before.slice(len(before) - 1, len(before))
         done += [held] * count + [placed.of(clip, carried)]
@@ -307,13 +320,13 @@ def ahead(last: End, then: End, yaw: float, seconds: float) -> Placement:
     return Placement(yaw, (float(shift[0]), 0.0, float(shift[2])))
 
 
-def unhurried_length(body: Humanoid, before: Clip, after: Clip) -> tuple[int, str]:
+def unhurried_length(last: End, then: End, before: Clip, after: Clip) -> tuple[int, str]:
     """How many frames a transition takes from the end of one clip to the beginning of another, and why.
 
-    Where the other one lies is open; it is turned already. As long as what takes longest: the joint that has
-    furthest to turn (at TURN), the hips up or down (RISE), the change of pace (CHANGE), and at least a STEP.
+    Where the other one lies is open; it is turned already, and how it begins. As long as what takes longest:
+    the joint that has furthest to turn (at TURN), the hips up or down (RISE), the change of pace (CHANGE),
+    and at least a STEP.
     """
-    last, then = end(body, before, -1), end(body, after, 0)
     name, turn = _furthest(before.slice(len(before) - 1, len(before)), after.slice(0, 1))
     rise = abs(float(then.place[1] - last.place[1]))
     change = float(np.linalg.norm(then.velocity - last.velocity))

@@ -1,0 +1,106 @@
+"""Where in its stride a body is: so that what follows a walk or a run goes on in step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.geometry.ground import FLOOR, turn
+from interpose.skeletons import JOINTS
+from interpose.skeletons.body import facing
+from interpose.skeletons.humanoid import Humanoid
+
+LEGS = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Leg", "Foot", "Toe")]
+# Seconds of velocity that count as much as a place: legs that pass one way and the other look alike.
+AHEAD = 0.1
+# Seconds that a stride, two steps, takes: from runs to slow walks.
+SHORTEST, LONGEST = 0.5, 1.8
+MOMENT = 3.0  # seconds at the end of a clip, or its beginning, that tell its stride
+# A stride comes back to where it was within this share of what poses of it are apart in the mean.
+ALIKE = 0.5
+
+
+@dataclass(frozen=True)
+class InStep:
+    """How a walk or a run goes on with another one.
+
+    Attributes:
+        stride: how many frames a stride takes, in the mean of both.
+        phase: the share of a stride by which the end of the one is further than the beginning of the other.
+        yaw: radians by which the other one would be turned if it began at the end of the one.
+        rate: radians by which both turn in a frame, in the mean.
+        velocities: (3,) metres a second over the floor, of the one at its end and of the other at its
+            beginning: over a whole stride, as each step sways.
+    """
+
+    stride: float
+    phase: float
+    yaw: float
+    rate: float
+    velocities: tuple[np.ndarray, np.ndarray]
+
+    def frames(self, least: int) -> int:
+        """How many frames, at least so many, go by until the beginning of the other one is next in step."""
+        strides = np.ceil(self.phase + least / self.stride)
+        return max(least, round((strides - self.phase) * self.stride))
+
+
+def legs(placed: np.ndarray, fps: float) -> np.ndarray:
+    """Of canonical positions (F, 22, 3) where knees, ankles and toes are around the hips, from in front,
+    and how far they get in a moment: (F, n) metres."""
+    around = turn(placed[:, LEGS] - placed[:, :1], -facing(placed)[:, None]).reshape(len(placed), -1)
+    steps = np.gradient(around, axis=0) if len(placed) > 1 else np.zeros_like(around)
+    return np.concatenate([around, AHEAD * fps * steps], axis=1)
+
+
+def stride(seen: np.ndarray, fps: float) -> int | None:
+    """How many frames a stride takes in (F, n) `legs`; None where nothing comes back."""
+    longest = min(round(LONGEST * fps), len(seen) - round(SHORTEST * fps / 2))
+    lags = np.arange(1, longest + 1)
+    if len(lags) < 3:
+        return None
+    apart = np.array([np.linalg.norm(seen[lag:] - seen[:-lag], axis=1).mean() for lag in lags])
+    usual = np.linalg.norm(seen[:, None] - seen, axis=2).mean()
+    for i in range(round(SHORTEST * fps) - 1, len(lags) - 1):
+        if apart[i] < ALIKE * usual and apart[i] <= apart[i - 1] and apart[i] <= apart[i + 1]:
+            return int(lags[i])
+    return None
+
+
+def in_step(body: Humanoid, before: Clip, after: Clip) -> InStep | None:
+    """How one clip goes on with another; None where they have no strides, or none that are alike.
+
+    The pose with which the other one begins was there, about, in the last stride of the one. There both had
+    come equally far in their sway from side to side, so that they head where they face in the same way.
+    """
+    moment = round(MOMENT * before.fps)
+    parts = before.slice(max(0, len(before) - moment), len(before)), after.slice(0, moment)
+    placed = [body.positions(part) for part in parts]
+    faces = [np.unwrap(facing(positions)) for positions in placed]
+    seen = [legs(positions, before.fps) for positions in placed]
+    first, second = (stride(some, before.fps) for some in seen)
+    if first is None or second is None:
+        return None
+    apart = np.linalg.norm(seen[0][-first:] - seen[1][0], axis=1)
+    if apart.min() > ALIKE * np.linalg.norm(seen[0][:, None] - seen[0], axis=2).mean():
+        return None
+    since = first - 1 - int(apart.argmin())  # frames from that pose to the end
+    rates = (faces[0][-1] - faces[0][-1 - first]) / first, (faces[1][second] - faces[1][0]) / second
+    ways = [
+        (hips[end] - hips[begin]) * FLOOR.values * before.fps / length
+        for hips, begin, end, length in (
+            (placed[0][:, 0], -1 - first, -1, first),
+            (placed[1][:, 0], 0, second, second),
+        )
+    ]
+    # Who goes round in a circle has turned by half of what a stride turns since the mean of its way.
+    ways = [turn(way, np.array(by / 2)) for way, by in zip(ways, (rates[0] * first, -rates[1] * second))]
+    return InStep(
+        stride=(first + second) / 2,
+        phase=since / first,
+        yaw=float(faces[0][-1 - since] + rates[0] * since - faces[1][0]) * body.hand[0],
+        rate=float(sum(rates) / 2) * body.hand[0],
+        velocities=(ways[0] * body.hand, ways[1] * body.hand),
+    )

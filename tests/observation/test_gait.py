@@ -1,0 +1,48 @@
+"""What goes on in step: where in its stride a walk is, and where it heads without the sway of its steps."""
+
+from __future__ import annotations
+
+from importlib import resources
+
+import numpy as np
+import pytest
+
+from interpose import tasks
+from interpose.formats import load
+from interpose.observation.gait import in_step, legs, stride
+from interpose.observation.timeline import Placement
+from interpose.skeletons import find_humanoid
+
+
+@pytest.fixture(scope="module")
+def walk():  # type: ignore[no-untyped-def]
+    """Four strides straight on, of 41 frames each."""
+    return load(resources.files("interpose") / "examples" / "walk.bvh")
+
+
+@pytest.mark.parametrize("missing", [2, 9, 16, 20])
+@pytest.mark.parametrize("moved", [(), (2.1, (4.0, 0.0, -3.0))])
+def test_a_cut_walk_goes_on_when_it_did(walk, missing, moved):
+    before, after = walk.slice(0, 90), Placement(*moved).of(walk.slice(90 + missing, len(walk)))
+    found = in_step(find_humanoid(walk), before, after)
+    assert found.frames(1) == pytest.approx(missing + 1, abs=2)
+    assert found.frames(15) in range(15, 15 + 43)
+    yaw = found.yaw + found.rate * (missing + 1) + (moved[0] if moved else 0.0)
+    assert np.degrees(np.angle(np.exp(1j * yaw))) == pytest.approx(0, abs=4)
+
+
+def test_a_loop_of_a_straight_walk_is_straight_and_slides_no_more_than_the_walk(walk):
+    """The hips sway by 9 degrees from side to side with each step."""
+    for start in (0, 10, 20, 30):
+        done = tasks.stitch([walk.slice(start, start + 110)], loop=True)
+        assert abs(np.degrees(done.loop.placement.yaw)) < 5
+        assert done.report.gaps[0].foot_slide < 12
+
+
+def test_what_does_not_walk_has_no_strides(cmu_walk):
+    body = find_humanoid(cmu_walk)
+    stands = cmu_walk.slice(50, 51)
+    still = stands.with_motion(np.repeat(stands.rotation, 60, 0), np.repeat(stands.translation, 60, 0))
+    assert stride(legs(body.positions(still), 30.0), 30.0) is None
+    assert in_step(body, still, cmu_walk) is None
+    assert in_step(body, stands, stands) is None
