@@ -382,6 +382,16 @@ def test_a_walk_that_loops_walks_on(data):
     assert way > 1
 
 
+def test_a_transition_without_strides_takes_as_long_as_feet_slide_least(cmu_walk):
+    """The first clip turns on the spot, and has none."""
+    clips = cmu_walk.slice(85, 125), cmu_walk.slice(150, 200)
+    least = len(timeline.lay(clips).gaps[0])
+    chosen, hurried = tasks.stitch(clips), tasks.stitch(clips, least)
+    assert least < len(chosen.clip) - 90 <= least + 30
+    assert chosen.report.gaps[0].foot_slide < 0.5 * hurried.report.gaps[0].foot_slide
+    assert "feet slide least so, of 11 lengths" in chosen.clips[1].why
+
+
 def test_other_values_of_the_clips_do_not_reach_each_other(cmu_walk):
     """Turning and moving a following clip changes nothing."""
     first, second = cmu_walk.slice(0, 80), cmu_walk.slice(120, 209)

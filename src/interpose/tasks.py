@@ -39,6 +39,10 @@ CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
 PIECE = 20.0  # seconds: joints that are missing for longer are completed piece by piece ...
 GROUP = 8.0  # seconds: gaps near each other are completed at once up to this length
 OVERLAP = 1.0  # ... which overlap by this much and are blended there
+# Seconds by which a transition may be longer than it has to be, where feet slide less so; seconds of motion
+# on either side with which that is tried; metres that feet have to travel in it; and the slide (cm/s) that
+# counts as much as gliding all along.
+TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
 FURTHEST = 600.0  # seconds that a forecast goes on for at most
@@ -519,6 +523,9 @@ def stitch(
         RequestError: what `timeline.lay` and `fill` refuse.
     """
     line = timeline.lay(clips, frames, align, loop)
+    if frames == "auto" and align:
+        lengths, whys = _tried(line, method, action, seed)
+        line = timeline.lay(clips, lengths, align, loop).because(whys)
     done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
     clip, provenance, closing = done.clip, done.provenance, None
     if line.again is not None:
@@ -531,6 +538,32 @@ def stitch(
     return Stitched(
         clip, lambda: _until(done.raw, len(clip)), provenance, done.report, clips=line.laid, loop=closing
     )
+
+
+def _tried(
+    line: timeline.Timeline, method: str, action: str, seed: int | None
+) -> tuple[list[int], list[str]]:
+    """How long each gap should be, and why: where strides do not tell it, as long as feet slide least with
+    the motion beside it, from its length on up to TRIED more."""
+    lengths, whys, fps = [], [], line.clip.fps
+    for way, gap in zip(line.ways, line.gaps):
+        near, slides = round(BESIDE * fps) + 1, {}
+        ends = (
+            line.clip.slice(max(0, gap.start - near), gap.start),
+            line.clip.slice(gap.stop, gap.stop + near),
+        )
+        for length in range(len(gap), len(gap) + round(TRIED * fps) + 1, max(1, round(fps / 10))):
+            if way.in_step:
+                break
+            pair = timeline.lay(ends, length)
+            (report,) = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps
+            if report.foot_slide is None or (report.foot_travel or 0.0) < TRAVELS:
+                break
+            slides[length] = report.foot_slide + GLIDING * (report.gliding or 0.0)
+        lengths.append(min(slides, key=lambda length: slides[length], default=len(gap)))
+        longer = f"feet slide least so, of {len(slides)} lengths that were tried; at least "
+        whys.append(longer * (lengths[-1] > len(gap)) + way.why)
+    return lengths, whys
 
 
 def _until(raw: Raw, stop: int) -> Raw:

@@ -78,6 +78,7 @@ class Laid:
         placement: how it was turned and shifted.
         scale: what its way was multiplied with because its body is larger or smaller than the first one's.
         why: what decided the length of the gap before it, where nobody said it.
+        in_step: whether it goes on at the phase of a stride at which the one before it ends.
     """
 
     name: str
@@ -86,6 +87,7 @@ class Laid:
     placement: Placement = Placement()
     scale: float = 1.0
     why: str = ""
+    in_step: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,6 +105,17 @@ class Timeline:
     gaps: list[Gap]
     laid: list[Laid] = field(repr=False)
     again: Laid | None = None
+
+    @property
+    def ways(self) -> list[Laid]:
+        """What each gap leads to."""
+        return [*self.laid[1:], *([self.again] if self.again else [])]
+
+    def because(self, whys: Sequence[str]) -> Timeline:
+        """The same, with a reason for the length of each gap."""
+        told = [replace(way, why=why) for way, why in zip(self.ways, whys)]
+        again = told.pop() if self.again else None
+        return replace(self, laid=[self.laid[0], *told], again=again)
 
 
 @dataclass(frozen=True)
@@ -181,7 +194,8 @@ def lay(
         held = before.slice(len(before) - 1, len(before))
         done += [held] * count + [placed.of(clip, carried)]
         gaps.append(Gap(start, start + count))
-        laid.append(Laid(clip.name, start + count, start + count + len(clip), placed, scale, why))
+        told = Laid(clip.name, start + count, start + count + len(clip), placed, scale, why, step is not None)
+        laid.append(told)
     again = laid.pop() if loop else None
     return Timeline(_joined(first, done), gaps, laid, again)
 
