@@ -74,6 +74,7 @@ def fill(
     path: Mapping[int, Any] | None = None,
     pins: Sequence[Pin] = (),
     temperature: float = 1.0,
+    zero: int = 0,
 ) -> Completion:
     """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
 
@@ -94,6 +95,7 @@ def fill(
         path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
         temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
+        zero: the frame that notes call 0.
 
     Returns:
         The completion; `report.open` lists the gaps left open.
@@ -143,7 +145,7 @@ def fill(
         way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if f in led}
         # The file tells what its joints can do, and is not what the window is written to.
         window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
-        part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo)
+        part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo - zero)
         for job, start, stop in pieces:
             fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
             inside = slice(start - lo, stop - lo)
@@ -327,6 +329,7 @@ def between(
     method: str = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    cut: bool = False,
 ) -> Completion:
     """Generate all that lies between key frames of a clip; the keys come back unchanged.
 
@@ -336,6 +339,7 @@ def between(
         keys: frame numbers, two or more, in any order.
         action: what the motion is, for methods that know actions.
         method, seed, progress: as in `fill`.
+        cut: give back what lies from the first key to the last alone.
 
     Raises:
         RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
@@ -354,7 +358,21 @@ def between(
             f"the keys are {', '.join(map(str, chosen)) or 'none'}",
             "Name some that are apart: 0,30,75. Of a file of poses: --start a.bvh#0 --target a.bvh#1.",
         )
-    return fill(clip, gaps, method, seed=seed, progress=progress, action=action)
+    zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
+    done = fill(clip, gaps, method, seed=seed, progress=progress, action=action, zero=zero)
+    return _part(done, zero, stop) if cut else done
+
+
+def _part(done: Completion, start: int, stop: int) -> Completion:
+    """The frames start to stop - 1 of a completion, all of its gaps among them."""
+    reports = [replace(gap, start=gap.start - start, stop=gap.stop - start) for gap in done.report.gaps]
+    clip, part = done.clip, slice(start, stop)
+    return Completion(
+        clip.with_motion(clip.rotation[part], clip.translation[part]),
+        lambda: _raw_part(done.raw, start, stop),
+        done.provenance[part],
+        replace(done.report, gaps=reports),
+    )
 
 
 def block(poses: Mapping[int, Clip]) -> Clip:
@@ -536,7 +554,12 @@ def stitch(
         clip = clip.with_motion(clip.rotation[:start], clip.translation[:start])
         provenance = provenance[:start]
     return Stitched(
-        clip, lambda: _until(done.raw, len(clip)), provenance, done.report, clips=line.laid, loop=closing
+        clip,
+        lambda: _raw_part(done.raw, 0, len(clip)),
+        provenance,
+        done.report,
+        clips=line.laid,
+        loop=closing,
     )
 
 
@@ -566,10 +589,10 @@ def _tried(
     return lengths, whys
 
 
-def _until(raw: Raw, stop: int) -> Raw:
-    """What a method said of the frames before `stop`."""
-    positions, own = (None if some is None else some[:stop] for some in (raw.positions, raw.own))
-    return replace(raw, clip=raw.clip.slice(0, stop), positions=positions, own=own)
+def _raw_part(raw: Raw, start: int, stop: int) -> Raw:
+    """What a method said of the frames start to stop - 1."""
+    positions, own = (None if some is None else some[start:stop] for some in (raw.positions, raw.own))
+    return replace(raw, clip=raw.clip.slice(start, stop), positions=positions, own=own)
 
 
 def plan(

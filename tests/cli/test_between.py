@@ -53,6 +53,20 @@ def test_poses_of_several_files(run, take):
         assert np.array_equal(made.translation[frame], source.translation[was])
 
 
+def test_files_tell_how_the_motion_leaves_and_meets_poses(run, take):
+    """Put back into its take it goes on as that did: between lone poses it would set off from a stand."""
+    done = run("between", "--start", "take.bvh#60", "--target", "take.bvh#90", "--frames", "29", "--json")
+    assert [gap["frames"] for gap in done.json["gaps"]] == ["1:30"]
+    truth, made = load(take).positions(), load(take.with_name("take.between.bvh")).positions()
+    assert len(made) == 31
+    assert np.array_equal(made[[0, -1]].round(6), truth[[60, 90]].round(6))
+    back = np.concatenate([truth[:60], made, truth[91:]])
+    jumps = np.linalg.norm(back[2:] - 2 * back[1:-1] + back[:-2], axis=-1).max(axis=1)
+    assert jumps[58:60].max() < 2 * jumps[30:55].max()
+    assert jumps[88:90].max() < 2 * jumps[95:120].max()
+    assert 100 * np.linalg.norm(made - truth[60:91], axis=-1).mean() < 6
+
+
 def test_a_length_is_proposed_with_its_reason(run, take):
     """As long as the walk itself took for the way, about."""
     done = run(

@@ -39,9 +39,11 @@ def between(
 
     Keys are frames of one file, or poses of several: then the motion begins
     with --start, --frames new frames follow, and --target is the last, on the
-    body of --start. What lies between the keys of a file has no influence; what
-    lies before the first and after the last one stays as it is. Writes the clip
-    and a report beside the input: keys.between.bvh and keys.between.json.
+    body of --start. How it leaves the one and meets the other is told by the
+    frames beside them in their files. What lies between the keys of a file has
+    no influence; what lies before the first and after the last one stays as it
+    is. Writes the clip and a report beside the input: keys.between.bvh and
+    keys.between.json.
 
     Try:
       interpose between keys.bvh --keys 0,30,75
@@ -72,11 +74,12 @@ def between(
     from interpose.cli.request import check_method
 
     check_method(method, license)
-    said = ""
+    said, cut = "", False
     if file is not None and not (start or target or frames or anchor):
         chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
     elif file is None and not keys and start and target:
         file, chosen, clip, said = _blocked(start, target, frames or "auto", anchor, reading)
+        cut = True
     else:
         raise RequestError(
             "it is not clear what the keys are",
@@ -86,7 +89,9 @@ def between(
     outputs = Outputs.choose(file, output, "between", player)
     outputs.check(file, force)
     with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
-        done = tasks.between(clip, chosen, action, method, seed, advance)
+        done = tasks.between(clip, chosen, action, method, seed, advance, cut)
+    if cut:
+        clip = done.clip
     return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force)
 
 
@@ -99,10 +104,11 @@ def _frame(text: str) -> int:
 def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
 ) -> tuple[Path, list[int], Clip, str]:
-    """A clip that holds poses of several files at its keys: the file it begins with, the keys, the clip, and
-    a line for the user where the length was proposed."""
+    """A clip that holds poses of several files at its keys, and before the first and after the last one what
+    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and a
+    line for the user where the length was proposed."""
     from interpose import tasks
-    from interpose.observation.timeline import fit, plausible_length
+    from interpose.observation.timeline import fit, joined, plausible_length
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
@@ -116,10 +122,10 @@ def _blocked(
         _, clip, frame = _pose(what, 0, reading)
         poses[int(at)] = fit(_frame_of(clip, frame), held)[0]
     met, end, said = max(poses), fit(_frame_of(after, first), held)[0], ""
+    beside = fit(after, before)[0]
+    moment = min(round(first * before.fps / after.fps), len(beside) - 1)
     if frames == "auto":
         # On to the target from the last pose before it; when anchors are met was said.
-        beside = fit(after, before)[0]
-        moment = min(round(first * before.fps / after.fps), len(beside) - 1)
         here = (poses[met], 0) if met else (before, last)
         count, why = plausible_length(*here, beside, moment)
         count += met
@@ -134,7 +140,9 @@ def _blocked(
         why = f"--target is frame {count + 1}"
         raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {count}.")
     poses[count + 1] = end
-    return file, sorted(poses), tasks.block(poses), said
+    near, blocked = round(tasks.BESIDE * before.fps), tasks.block(poses)
+    parts = [before.slice(max(0, last - near), last), blocked, beside.slice(moment + 1, moment + 1 + near)]
+    return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), said
 
 
 def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip, int]:

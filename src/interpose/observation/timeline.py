@@ -166,7 +166,7 @@ def lay(
         fitted.append((first.slice(0, round(AGAIN * first.fps) + 1), 1.0))
     counts = _counts(frames, len(fitted) - 1)
     # Handedness and rest pose are found from all of the motion: single short clips must not decide.
-    everything = _joined(first, [clip for clip, _ in fitted])
+    everything = joined(first, [clip for clip, _ in fitted])
     body, carried = find_humanoid(everything), carriers(everything)
     done, laid, gaps = [first], [Laid(first.name, 0, len(first))], []
     for (clip, scale), count in zip(fitted[1:], counts):
@@ -197,10 +197,10 @@ def lay(
         told = Laid(clip.name, start + count, start + count + len(clip), placed, scale, why, step is not None)
         laid.append(told)
     again = laid.pop() if loop else None
-    return Timeline(_joined(first, done), gaps, laid, again)
+    return Timeline(joined(first, done), gaps, laid, again)
 
 
-def _joined(first: Clip, clips: list[Clip]) -> Clip:
+def joined(first: Clip, clips: list[Clip]) -> Clip:
     """The motion of clips on one skeleton, one after another, with the file layout of the first one."""
     rotation, translation = (
         np.concatenate([getattr(clip, name) for clip in clips]) for name in ("rotation", "translation")
