@@ -45,7 +45,6 @@ OVERLAP = 1.0  # ... which overlap by this much and are blended there
 TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
-FURTHEST = 600.0  # seconds that a forecast goes on for at most
 HOTTEST = 10.0  # times the noise of the training that may be injected
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
@@ -451,12 +450,7 @@ def forecast(
             raise RequestError(
                 f"cannot forecast {count} {what}s", "it is a number from 1 on", f"Write for example {fix}."
             )
-    if frames > FURTHEST * clip.fps:
-        raise RequestError(
-            f"cannot forecast {frames} frames",
-            f"at {clip.fps:g} fps they are more than {FURTHEST / 60:g} minutes",
-            "Ask for fewer.",
-        )
+    timeline.bounded(frames, clip.fps)
     if not 0 <= temperature <= HOTTEST:
         raise RequestError(
             f"cannot sample at temperature {temperature:g}",

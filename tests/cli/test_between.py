@@ -113,6 +113,7 @@ def test_a_target_of_another_body_stands_on_the_floor(run, take):
         (["take.bvh", "--keys", "0,9", "--start", "take.bvh"], "not clear"),
         (["--start", "take.bvh", "--frames", "5"], "not clear"),
         (["--start", "take.bvh", "--target", "take.bvh", "--frames", "0"], "cannot generate 0"),
+        (["--start", "take.bvh", "--target", "take.bvh", "--frames", "1000000"], "cannot generate 1000000"),
         (["--start", "take.bvh#999", "--target", "take.bvh", "--frames", "5"], "no frame 999"),
         (["--start", "take.bvh", "--target", "take.bvh", "--frames", "5", "--anchor", "take.bvh@6"], "@6"),
         (["--start", "take.bvh", "--target", "none.bvh", "--frames", "5"], "none.bvh"),

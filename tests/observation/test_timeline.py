@@ -66,6 +66,17 @@ def test_bodies_of_other_size_stand_on_the_floor(cmu_walk, run):
     assert abs(before - after) < 0.02
 
 
+def test_the_same_rig_under_another_namespace_is_the_same_rig(cmu_walk):
+    def under(space: str, clip):  # type: ignore[no-untyped-def]
+        names = tuple(space + name for name in clip.skeleton.names)
+        return replace(clip, skeleton=replace(clip.skeleton, names=names), source=None)
+
+    first, second = under("mixamorig:", cmu_walk.slice(0, 60)), under("mixamorig1:", cmu_walk.slice(90, 150))
+    one, other = lay([first, second], 20), lay([cmu_walk.slice(0, 60), cmu_walk.slice(90, 150)], 20)
+    assert one.clip.skeleton.names == first.skeleton.names
+    assert np.array_equal(one.clip.rotation, other.clip.rotation)
+
+
 def test_a_walk_goes_on_in_its_direction_at_its_pace(cmu_walk):
     first, second = cmu_walk.slice(10, 65), Placement(2.0, (5.0, 0.0, 1.0)).of(cmu_walk.slice(140, 200))
     line = lay([first, second], 29)
@@ -171,6 +182,7 @@ def test_what_is_no_humanoid_goes_on_as_its_root_is_turned():
         (1, "auto", "--loop"),
         (2, 0, "cannot generate 0"),
         (2, "soon", "cannot generate soon"),
+        (2, 10**6, "more than 10 minutes"),
         (2, [5, 6], "2 lengths do not fit 1 gaps"),
     ],
 )

@@ -108,7 +108,7 @@ def _blocked(
     these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and a
     line for the user where the length was proposed."""
     from interpose import tasks
-    from interpose.observation.timeline import fit, joined, plausible_length
+    from interpose.observation.timeline import bounded, fit, joined, plausible_length
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
@@ -136,6 +136,7 @@ def _blocked(
         raise RequestError(
             f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
         )
+    bounded(count, before.fps)
     if met > count:
         why = f"--target is frame {count + 1}"
         raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {count}.")

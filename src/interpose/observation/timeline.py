@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn, wrap
@@ -25,6 +25,7 @@ from interpose.skeletons.carrier import STILL, carriers, hips_of, moved
 from interpose.skeletons.humanoid import Humanoid
 
 MOMENT = 0.5  # seconds at an end of a clip that tell where it is heading, and at which pace
+FURTHEST = 600.0  # seconds: more are a slip of the finger
 AGAIN = 2.0  # seconds of the beginning that a loop is led back to
 FORWARD = np.radians(60.0)  # who goes further aside of where they face steps sideways or backwards
 STANDS = 0.4  # metres a second: who is slower does not go anywhere
@@ -165,6 +166,8 @@ def lay(
     if loop:
         fitted.append((first.slice(0, round(AGAIN * first.fps) + 1), 1.0))
     counts = _counts(frames, len(fitted) - 1)
+    for count in counts:
+        bounded(count or 1, first.fps)
     # Handedness and rest pose are found from all of the motion: single short clips must not decide.
     everything = joined(first, [clip for clip, _ in fitted])
     body, carried = find_humanoid(everything), carriers(everything)
@@ -200,6 +203,16 @@ def lay(
     return Timeline(joined(first, done), gaps, laid, again)
 
 
+def bounded(frames: int, fps: float) -> None:
+    """RequestError for more frames in a row than anybody makes up at once."""
+    if frames > FURTHEST * fps:
+        raise RequestError(
+            f"cannot generate {frames} frames",
+            f"at {fps:g} fps they are more than {FURTHEST / 60:g} minutes",
+            "Ask for fewer.",
+        )
+
+
 def joined(first: Clip, clips: list[Clip]) -> Clip:
     """The motion of clips on one skeleton, one after another, with the file layout of the first one."""
     rotation, translation = (
@@ -229,9 +242,9 @@ def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
 def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
     """A clip on the skeleton and at the frame rate of another one, and what its way was multiplied with.
 
-    Joints keep their local rotations, so their names and rest poses must be the same; bones may be of other
-    lengths. Then places (of the hips, above the floor at height 0 and from where they begin) go by the ratio
-    of the legs: feet that stand still stand, and on the floor.
+    Joints keep their local rotations, so their names (namespaces apart) and rest poses must be the same;
+    bones may be of other lengths. Then places (of the hips, above the floor at height 0 and from where they
+    begin) go by the ratio of the legs: feet that stand still stand, and on the floor.
 
     Raises:
         RequestError: other joints, joints that rest differently or hang from others, or a joint that is
@@ -265,9 +278,15 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
     return replace(fitted, source=None), scale
 
 
+def _bare(skeleton: Skeleton) -> Skeleton:
+    """The skeleton without the namespace of a scene before its names: mixamorig1:Hips is Hips."""
+    names = tuple(name.rpartition(":")[2] for name in skeleton.names)
+    return replace(skeleton, names=names) if len({*names}) == len(names) and all(names) else skeleton
+
+
 def _matched(clip: Clip, like: Clip) -> list[int]:
     """For each joint of `like` the same one of `clip`; RequestError where they are not the same."""
-    mine, other = like.skeleton, clip.skeleton
+    mine, other = (_bare(some.skeleton) for some in (like, clip))
     what = f"{clip.name or 'a clip'} is on another skeleton than {like.name or 'the first one'}"
     fix = "Use clips of one character, or of others on the same rig."
     if odd := sorted({*mine.names} ^ {*other.names}):
