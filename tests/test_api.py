@@ -114,6 +114,18 @@ def test_scan_takes_paths_and_clips(data, cmu_walk):
     assert interpose.scan(data / "cmu_walk.bvh") == interpose.scan(cmu_walk)
 
 
+def test_what_does_not_fit_is_said(cmu_walk):
+    seen = interpose.Observation.full(cmu_walk.slice(0, 100))
+    for request, said in (
+        (lambda: interpose.fill(cmu_walk, seen), "does not fit the clip"),
+        (lambda: interpose.Observation(np.ones((5, 3, 4)), np.ones((5, 3, 4))), "does not fit"),
+        (lambda: interpose.forecast(cmu_walk, 30.5), "whole number"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), seed=-1), "seed -1"),
+    ):
+        with pytest.raises(interpose.RequestError, match=said):
+            request()
+
+
 @pytest.mark.parametrize("gap", [slice(10, 20), 7, [slice(10, 20)]])
 def test_gaps_that_are_none_say_how_to_write_one(cmu_walk, gap):
     with pytest.raises(interpose.RequestError, match="cannot read the gap") as failed:

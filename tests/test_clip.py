@@ -88,9 +88,30 @@ def test_shapes_and_rate_are_checked():
         Clip(skeleton(), rotation[:, :3], np.zeros((3, 2, 3)), 30)
     with pytest.raises(RequestError, match="translations do not fit"):
         Clip(skeleton(), rotation, np.zeros((2, 2, 3)), 30)
-    for fps in (0, -1, np.nan):
+    for fps in (0, -1, np.nan, 1 / 30, "30", None):
         with pytest.raises(RequestError, match="frame rate"):
             Clip(skeleton(), rotation, np.zeros((3, 2, 3)), fps)
+
+
+@pytest.mark.parametrize("factor", [3.0, 1.01, 0.0])
+def test_quaternions_are_unit_quaternions(factor):
+    rotation = np.tile([1.0, 0, 0, 0], (3, 4, 1))
+    rotation[1, 2] *= factor
+    with pytest.raises(RequestError, match="at frame 1") as failed:
+        Clip(skeleton(), rotation, np.zeros((3, 2, 3)), 30)
+    assert "w, x, y, z" in str(failed.value)
+
+
+def test_a_skeleton_from_arrays_is_one_and_bones_are_checked():
+    made = Skeleton(["a", "b"], np.array([-1, 0]), np.zeros((2, 3)))
+    assert Clip(made, np.tile([1.0, 0, 0, 0], (2, 2, 1)), np.zeros((2, 1, 3)), 30).positions().shape == (
+        2,
+        2,
+        3,
+    )
+    for bones in (np.zeros((3, 3)), np.full((2, 3), np.nan)):
+        with pytest.raises(RequestError, match="bones do not fit"):
+            Skeleton(("a", "b"), (-1, 0), bones)
 
 
 def test_slices_and_new_motion():

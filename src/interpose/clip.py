@@ -40,7 +40,13 @@ class Skeleton:
     def __post_init__(self) -> None:
         count = len(self.names)
         fill = object.__setattr__
-        fill(self, "rest_translation", np.asarray(self.rest_translation, float).reshape(count, 3))
+        fill(self, "names", tuple(self.names))
+        fill(self, "parents", tuple(int(parent) for parent in self.parents))
+        fill(self, "rest_translation", np.asarray(self.rest_translation, float))
+        if self.rest_translation.shape != (count, 3) or not np.isfinite(self.rest_translation).all():
+            raise RequestError(
+                "bones do not fit", f"expected ({count}, 3) numbers, got {self.rest_translation.shape}"
+            )
         if self.rest_rotation is None:
             fill(self, "rest_rotation", np.tile([1.0, 0, 0, 0], (count, 1)))
         if self.rest_scale is None:
@@ -90,13 +96,18 @@ class Skeleton:
         return above
 
 
+# Frames a second: who has fewer gives a frame time for a rate. How far the square of a quaternion's length
+# may be from 1: what is stored with three decimals is nearer.
+SLOWEST, UNIT = 0.1, 0.01
+
+
 @dataclass(frozen=True, eq=False)
 class Clip:
     """Motion of a skeleton over time, always finite: what is missing stands in an Observation beside it.
 
     Attributes:
         skeleton: the joints.
-        rotation: (F, J, 4) local rotations.
+        rotation: (F, J, 4) local rotations, unit quaternions w, x, y, z.
         translation: (F, K, 3) metres: local translations of the joints in `translated`. A root's is its
             global position.
         fps: frames a second.
@@ -130,13 +141,26 @@ class Clip:
                 "translations do not fit",
                 f"expected ({frames}, {len(self.translated)}, 3), got {self.translation.shape}",
             )
-        if not (np.isfinite(self.fps) and self.fps > 0):
-            raise RequestError("the frame rate is wrong", f"it must be above zero, got {self.fps}")
+        if not isinstance(self.fps, int | float | np.number) or not SLOWEST <= self.fps < np.inf:
+            raise RequestError(
+                "the frame rate is wrong",
+                f"it is a number of frames a second, {SLOWEST:g} or more, and got {self.fps!r}",
+                "Of a frame time give one over it.",
+            )
         if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
             raise RequestError(
                 "the clip has values that are no numbers",
                 "a clip is always finite",
                 "Use interpose.Observation.from_nan to turn NaN into missing values first.",
+            )
+        size = np.einsum("fjc,fjc->fj", self.rotation, self.rotation)
+        if np.abs(size - 1).max(initial=0.0) > UNIT:
+            frame, joint = np.unravel_index(int(np.abs(size - 1).argmax()), size.shape)
+            long = f"{size[frame, joint] ** 0.5:.3g} long"
+            raise RequestError(
+                "rotations are no unit quaternions",
+                f"that of {self.skeleton.names[joint]} at frame {frame} is {long}",
+                "Divide them by their lengths; they are w, x, y, z.",
             )
 
     def __len__(self) -> int:

@@ -104,6 +104,9 @@ def fill(
             observed; a part that does not fit; a path, or a pin, outside of the gaps.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
+    observation.check(clip)
+    if seed is not None and seed < 0:
+        raise RequestError(f"cannot take the seed {seed}", "it is a number from 0 on", "Write --seed 1.")
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, parts)
     momentary = isinstance(gaps, Observation) and not observation.pins
@@ -446,9 +449,11 @@ def forecast(
     """
     frames = round(AHEAD * clip.fps) if frames is None else frames
     for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
-        if count < 1:
+        if count < 1 or count != int(count):
             raise RequestError(
-                f"cannot forecast {count} {what}s", "it is a number from 1 on", f"Write for example {fix}."
+                f"cannot forecast {count} {what}s",
+                "it is a whole number from 1 on",
+                f"Write for example {fix}.",
             )
     timeline.bounded(frames, clip.fps)
     if not 0 <= temperature <= HOTTEST:

@@ -51,6 +51,13 @@ def test_metrics_against_their_definition(sequence):
                 weights += power[1].sum()
     assert npss(other, turned) == pytest.approx(total / weights)
     assert npss(turned, turned) == 0
+    # What is no number is no result.
+    other[3, 20, 5] = np.nan
+    assert np.isnan(npss(other, turned))
+    assert np.isnan(l2q(other, turned)).sum() == 1
+    for metric in (lambda: l2q(turned[:, :1], turned), lambda: l2p(moved[:, :1], placed, statistics)):
+        with pytest.raises(RequestError, match="cannot compare"):
+            metric()
 
 
 def test_signs_follow_the_context(sequence):

@@ -64,6 +64,14 @@ def test_divergence(noise, pooled):
     assert spectrum.pskl(noise[::-1], low, pooled) == pytest.approx(there), "sets have no order"
 
 
+def test_what_is_no_number_has_no_spectrum(noise):
+    broken = noise.copy()
+    broken[0, 3] = np.nan
+    assert np.isnan(spectrum.psent(broken))
+    assert np.isnan(spectrum.pskl(broken, noise))
+    assert np.isnan(spectrum.pskl(noise, broken))
+
+
 @POOLED
 def test_spectra_do_not_depend_on_the_unit(noise, pooled):
     low = gaussian_filter1d(noise, 1.0, axis=1)

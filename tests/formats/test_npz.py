@@ -21,7 +21,9 @@ def some_clip():
         rng.standard_normal((3, 4)),
         np.array([1, 2, 3.0]),
     )
-    return Clip(skeleton, rng.standard_normal((5, 3, 4)), rng.standard_normal((5, 2, 3)), 29.97, (0, 2))
+    turned = rng.standard_normal((5, 3, 4))
+    turned /= np.linalg.norm(turned, axis=-1, keepdims=True)
+    return Clip(skeleton, turned, rng.standard_normal((5, 2, 3)), 29.97, (0, 2))
 
 
 def test_exact(tmp_path):

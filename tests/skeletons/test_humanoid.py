@@ -195,6 +195,13 @@ def test_a_left_handed_take_is_filled_as_its_mirror_image(walk):
     assert np.abs(reflect(other.clip).positions() - one.clip.positions()).max() < 0.01
 
 
+def test_rotations_in_another_order_come_to_an_end(walk):
+    """x, y, z, w: knees bend forward in it and in its mirror image."""
+    clip, _ = rigs.build("smpl", walk)
+    wrong = clip.with_motion(clip.rotation[..., [1, 2, 3, 0]], clip.translation)
+    assert len(tasks.fill(wrong, [Gap(60, 90)]).clip) == len(clip)
+
+
 def test_a_rest_frame_of_a_left_handed_take(walk):
     """The frame is looked at in the mirror, too."""
     clip, _ = rigs.build("smpl", walk)

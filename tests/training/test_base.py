@@ -325,7 +325,7 @@ def test_it_completes_clips(trained, cmu_walk, monkeypatch):
     others = [j for j, name in enumerate(cmu_walk.skeleton.names) if name not in ("LeftArm", "LeftForeArm")]
     assert np.array_equal(lost.clip.rotation[:, others], cmu_walk.rotation[:, others])
     assert len(tasks.forecast(cmu_walk, 150, method="small").clip) == len(cmu_walk) + 150
-    assert "more than the 40" in small.refuses(cmu_walk, Gap(50, 100))
+    assert tasks.fill(cmu_walk, [Gap(50, 100)], "small").report.gaps[0].model == "small"
     assert small.for_action("walk").action == "walk"
     with pytest.raises(RequestError, match="unknown action"):
         small.for_action("fly")

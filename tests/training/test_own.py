@@ -93,3 +93,15 @@ def test_weights_of_ones_own_are_made_judged_and_used(takes, data, capsys):
     assert main(["train", "--from", "cae", "--data", str(takes), "--out", "other"]) == 2
     assert "cannot be fine-tuned" in capsys.readouterr().err
     assert not Path("other").exists()
+
+
+def test_weights_that_are_there_are_not_replaced(tmp_path, capsys):
+    run, out = tmp_path / "run", tmp_path / "weights"
+    run.mkdir()
+    out.mkdir()
+    for name in ("averaged.pt", "log.jsonl", "settings.json"):
+        (run / name).touch()
+    (out / "small.onnx").write_text("trained for hours")
+    assert main(["export", "base", "--run", str(run), "--out", str(out)]) == 3
+    assert "--force" in capsys.readouterr().err
+    assert (out / "small.onnx").read_text() == "trained for hours"

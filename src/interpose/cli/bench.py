@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 from cyclopts import App, Parameter
+from cyclopts.validators import Number
 
 from interpose.cli.console import console, say, say_json
 from interpose.cli.research import needs_torch, shown
@@ -17,6 +18,11 @@ from interpose.errors import RequestError
 if TYPE_CHECKING:
     from interpose.evaluation.conditions import Table
     from interpose.methods.weights import Card
+
+
+# How many windows are measured.
+Count = Annotated[int, Parameter(validator=Number(gte=1))]
+Most = Count | None
 
 
 @Parameter(name="*")
@@ -61,7 +67,7 @@ bench = App(
 def infilling(
     *,
     weights: list[Path] = [],  # noqa: B006
-    most: int | None = None,
+    most: Most = None,
     asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 1: joint error when gaps of 0 to 60 frames in 4 s are filled.
@@ -89,7 +95,7 @@ def infilling(
 @bench.command
 def denoise(
     *,
-    most: int | None = None,
+    most: Most = None,
     asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 2: joint error of noisy clips of 4 s, before and after denoising.
@@ -113,7 +119,7 @@ def denoise(
 def noise(
     *,
     weights: list[Path] = [],  # noqa: B006
-    most: int = 400,
+    most: Count = 400,
     asked: Tabled = Tabled(),
 ) -> None:
     """Kaufmann et al. 2020, table 2, as in the paper: joint error of networks on noise and lost joints.
@@ -149,7 +155,7 @@ def noise(
 def bones(
     *,
     weights: list[Path] = [],  # noqa: B006
-    most: int | None = None,
+    most: Most = None,
     plot: Path | None = None,
     asked: Tabled = Tabled(),
 ) -> None:
@@ -176,7 +182,7 @@ def bones(
 @bench.command
 def skeletons(
     *,
-    most: int | None = 60,
+    most: Most = 60,
     asked: Tabled = Tabled(),
 ) -> None:
     """Every data set on its own skeleton and frame rate: error of finished fills, gaps of .5, 1 and 2 s.
@@ -200,7 +206,7 @@ def lafan1(
     method: list[str] = [],  # noqa: B006
     protocol: Literal["official", "cmib"] = "official",
     gaps: str | None = None,
-    most: int | None = None,
+    most: Most = None,
     plot: Path | None = None,
     asked: Asked = Asked(),
 ) -> None:
@@ -240,7 +246,7 @@ def threshold(
     *,
     network: str = "cae",
     data: Path = Path("data"),
-    most: int | None = 60,
+    most: Most = 60,
     plot: Path | None = None,
     save: bool = False,
     json: bool = False,
@@ -279,7 +285,7 @@ def threshold(
 @bench.command
 def context(
     *,
-    most: int | None = 6,
+    most: Most = 6,
     plot: Path | None = None,
     asked: Asked = Asked(),
 ) -> None:
@@ -308,7 +314,7 @@ def context(
 def every(
     *,
     methods: list[str] = [],  # noqa: B006
-    most: int | None = 8,
+    most: Most = 8,
     asked: Tabled = Tabled(),
 ) -> None:
     """Every task by every method: gaps, keys, lost joints, forecasts. Is one network good at all of them?
@@ -337,7 +343,7 @@ def every(
 def reliability(
     *,
     method: str = "small",
-    most: int | None = 40,
+    most: Most = 40,
     plot: Path | None = None,
     asked: Tabled = Tabled(),
 ) -> None:
@@ -401,7 +407,7 @@ def recipes(
 def representations(
     *,
     weights: list[Path] = [],  # noqa: B006
-    most: int | None = None,
+    most: Most = None,
     asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 1: L2P of CMIB by how it holds rotations.
@@ -428,7 +434,7 @@ def representations(
 def anchors(
     *,
     weights: list[Path] = [],  # noqa: B006
-    most: int | None = None,
+    most: Most = None,
     asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 5: by how much CMIB itself misses an anchor that was moved aside.
@@ -456,7 +462,7 @@ def anchors(
 def actions(
     *,
     weights: Path | None = None,
-    most: int | None = 30,
+    most: Most = 30,
     asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 6: L2P of CMIB when it is told the right action, and each other one.
@@ -479,7 +485,7 @@ def actions(
 def hdm05(
     *,
     weights: Path | None = None,
-    most: int | None = None,
+    most: Most = None,
     asked: Asked = Asked(),
 ) -> None:
     """Kim et al. 2022, table 4: L2P and L2Q of CMIB on MPI-HDM05, which its weights have not seen.
@@ -597,7 +603,7 @@ def occlusion(
     weights: list[Path] = [],  # noqa: B006
     drawn: Literal["exact", "code"] = "exact",
     fps: Literal[5, 30] = 5,
-    most: int | None = None,
+    most: Most = None,
     asked: Tabled = Tabled(),
 ) -> None:
     """Hernandez Ruiz et al. 2019, table 3: joint error where 80 % of joints, limbs, frames or values is lost.
@@ -633,7 +639,7 @@ def forecasting(
     fps: Literal[5, 30] = 5,
     variant: Literal["paper", "code"] = "paper",
     samples: int = 5,
-    most: int | None = None,
+    most: Most = None,
     asked: Tabled = Tabled(),
 ) -> None:
     """Hernandez Ruiz et al. 2019, table 1: do forecasts of 4 s move as people do?

@@ -34,6 +34,7 @@ class Of:
     splits: Annotated[
         list[str], Parameter(help="what it was trained on: train (the default), or train,validation.")
     ] = field(default_factory=list)
+    force: Annotated[bool, Parameter(help="replace weights that are there.")] = False
 
 
 @export.command
@@ -152,5 +153,8 @@ def _export(write: Callable[..., Any], of: Of, out: Path) -> None:
     for name in ("averaged.pt", "log.jsonl", "settings.json"):
         if not (of.run / name).is_file():
             raise FileError(f"cannot export {of.run}", f"it has no {name}", "Train first: interpose train.")
+    if not of.force and (there := sorted(out.glob("*.onnx"))):
+        why = f"{there[0].name} is in there"
+        raise FileError(f"cannot write into {out}", why, "Choose another --out, or add --force.")
     card = write(of.run, load_packs(of.packs), out, list(chosen))
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")

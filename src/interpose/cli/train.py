@@ -110,7 +110,9 @@ def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipp
     say(f"done: {run.out}")
     # So does a study.
     own = changed.config if name == "base" else name
-    there = Path("weights") / own if shipped and not run.set else run.out / "weights"
+    there = Path("weights") / own
+    if not shipped or run.set or there.exists():
+        there = run.out / "weights"
     say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}")
 
 

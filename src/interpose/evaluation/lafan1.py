@@ -208,13 +208,22 @@ def load(data: Path, split: str, progress: Callable[[str], None] = lambda line: 
 # Metrics -------------------------------------------------------------------------------------------------
 
 
+def _alike(said: np.ndarray, truth: np.ndarray) -> None:
+    """RequestError where there are not as many of what is said as of the truth."""
+    if said.shape != truth.shape:
+        why = f"what is said is {said.shape}, and the truth {truth.shape}"
+        raise RequestError("cannot compare motions", why, "Give as many windows, frames and joints.")
+
+
 def l2p(positions: np.ndarray, truth: np.ndarray, statistics: Statistics) -> np.ndarray:
     """(W,) mean over frames of the distance of normalised positions (W, n, 22, 3)."""
+    _alike(positions, truth)
     return np.linalg.norm(statistics.normalise(positions) - statistics.normalise(truth), axis=-1).mean(axis=1)
 
 
 def l2q(turned: np.ndarray, truth: np.ndarray) -> np.ndarray:
     """(W,) mean over frames of the distance of global quaternions (W, n, 22, 4), as flat vectors."""
+    _alike(turned, truth)
     return np.linalg.norm((turned - truth).reshape(*truth.shape[:2], -1), axis=-1).mean(axis=1)
 
 
@@ -223,13 +232,13 @@ def npss(turned: np.ndarray, truth: np.ndarray) -> float:
 
     Source: Gopalakrishnan et al. 2019, with the real part of the spectrum, as in the authors' evaluation.
     """
+    _alike(turned, truth)
     power, true_power = (
         np.real(np.fft.fft(q.reshape(*q.shape[:2], -1), axis=1)) ** 2 for q in (turned, truth)
     )
     total, true_total = (p.sum(axis=1, keepdims=True) for p in (power, true_power))
     cumulative, true_cumulative = (
-        np.cumsum(np.divide(p, t, out=np.zeros_like(p), where=t > 0), axis=1)
-        for p, t in ((power, total), (true_power, true_total))
+        np.cumsum(p / np.where(t == 0, 1.0, t), axis=1) for p, t in ((power, total), (true_power, true_total))
     )
     distance = np.abs(cumulative - true_cumulative).sum(axis=1)
     return float(np.average(distance, weights=true_total[:, 0]))

@@ -65,7 +65,7 @@ def _shares(sequences: np.ndarray, pooled: bool) -> np.ndarray:
         power = power.sum(axis=0, keepdims=True) + EPSILON
     total = power.sum(axis=1, keepdims=True)
     constant = (np.arange(power.shape[1]) == 0)[:, None]
-    return np.where(total > 0, power / np.where(total > 0, total, 1.0), constant)
+    return np.where(total == 0, constant, power / np.where(total == 0, 1.0, total))
 
 
 def joint_angles(positions: np.ndarray, code: bool = False) -> np.ndarray:

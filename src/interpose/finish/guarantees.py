@@ -76,12 +76,7 @@ def complete(
         RequestError: the observation or one of its pins does not fit the clip, nothing fills a gap, or a
             point of the path lies in no gap of the whole pose with known frames on both sides.
     """
-    if observation.rotation.shape != clip.rotation.shape[:2]:
-        raise RequestError(
-            "the observation does not fit the clip",
-            f"it has {observation.rotation.shape} frames and joints, the clip {clip.rotation.shape[:2]}",
-            "Make it from the same clip, for example with Observation.from_gaps.",
-        )
+    observation.check(clip)
     fallback = fallback or Spline()
     if observation.pins:
         return _pinned(clip, observation, method, seed, fallback, limit, path, first)
@@ -112,6 +107,7 @@ def complete(
         raw = _second(fallback, hidden, observation, gaps, seed)
     else:
         raw = method.complete(hidden, observation, seed)
+        _sound(raw, hidden, method.name)
 
     opinion, error = _opinion(raw, known, spans)
     if not isinstance(method, Layer):
@@ -381,6 +377,19 @@ def _second(
         if reason := fallback.refuses(hidden, gap):
             raise RequestError(f"cannot fill {gap}", f"{fallback.name}: {reason}", "Choose another method.")
     return fallback.complete(hidden, observation, seed)
+
+
+def _sound(raw: Any, clip: Clip, name: str) -> None:
+    """RequestError naming a method that gives something else than a completion of the clip."""
+    if not isinstance(raw, Raw):
+        problem = f"it gave a {type(raw).__name__}, no interpose.methods.protocol.Raw"
+    elif raw.clip.rotation.shape != clip.rotation.shape:
+        problem = f"it gave {raw.clip.rotation.shape[:2]} frames and joints of {clip.rotation.shape[:2]}"
+    elif raw.positions is not None and np.shape(raw.positions) != (len(clip), len(raw.joints), 3):
+        problem = f"it gave positions {np.shape(raw.positions)} of {len(raw.joints)} joints"
+    else:
+        return
+    raise RequestError(f"the method {name} does not work", problem, "Tell those who made it.")
 
 
 def _opinion(raw: Raw, known: Observation, spans: list[Span]) -> tuple[Clip, np.ndarray | None]:

@@ -121,8 +121,18 @@ class Observation:
         fill(self, "translation", np.asarray(self.translation, bool))
         if self.trust is None:
             fill(self, "trust", np.ones(self.rotation.shape))
-        if not self.rotation.shape == self.translation.shape == np.shape(self.trust):
+        same = self.rotation.shape == self.translation.shape == np.shape(self.trust)
+        if not same or self.rotation.ndim != 2:
             raise RequestError("the observation does not fit", "its arrays must all be (frames, joints)")
+
+    def check(self, clip: Clip) -> None:
+        """RequestError if it has other frames or joints than a clip."""
+        if self.rotation.shape != clip.rotation.shape[:2]:
+            raise RequestError(
+                "the observation does not fit the clip",
+                f"it has {self.rotation.shape} frames and joints, the clip {clip.rotation.shape[:2]}",
+                "Make it from the same clip, for example with Observation.from_gaps.",
+            )
 
     @classmethod
     def full(cls, clip: Clip) -> Observation:
@@ -160,6 +170,9 @@ class Observation:
         """
         translated = translated or skeleton.roots
         rotation, translation = np.array(rotation, float), np.array(translation, float)
+        for name, values, last in (("rotations", rotation, 4), ("translations", translation, 3)):
+            if values.ndim != 3 or values.shape[-1] != last:
+                raise RequestError(f"{name} do not fit", f"expected (F, n, {last}), got {values.shape}")
         known = np.isfinite(rotation).all(axis=-1)
         moved = np.ones(known.shape, bool)
         moved[:, list(translated)] = np.isfinite(translation).all(axis=-1)

@@ -176,7 +176,9 @@ class Humanoid:
         """
         if self.left_handed:
             right = self._right(like)
-            own = Humanoid(right, replace(self.mapping, skeleton=right.skeleton), self.rest)
+            # It is said: motion that makes no sense may look like the mirror image of some either way.
+            skeleton = replace(right.skeleton, roles={**right.skeleton.roles, "hand": "right"})
+            own = Humanoid(right, replace(self.mapping, skeleton=skeleton), self.rest)
             done = reflect(own.to_clip(canonical, root, right))
             return like.with_motion(done.rotation, done.translation)
         skeleton = self.mapping.skeleton
