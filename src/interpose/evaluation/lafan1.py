@@ -35,6 +35,7 @@ STATISTICS_WINDOW, STATISTICS_STEP = 50, 20
 WHOLE = 13  # sequences of subject 5 in the complete data set
 BATCH = 256  # windows whose kinematics are computed at once
 GLOBAL = "linear, global"  # straight lines of global positions
+SPOILT = 0.05  # a share of fills that are the spline's from which tables of a method say so
 TRUTH = "truth"  # the row of the motion as it was
 LEAVES = [joint for joint in range(len(PARENTS)) if joint not in PARENTS]
 
@@ -337,8 +338,11 @@ class Lafan1:
         """Markdown: a row a method, with the ratio to interpolation in brackets."""
 
         def cell(name: str, gap: int) -> str:
-            value = getattr(self.rows[name][gap], figure)
-            return f"{value:.{digits}f} ({self.ratio(name, gap, figure):.2f})"
+            row = self.rows[name][gap]
+            said = f"{getattr(row, figure):.{digits}f} ({self.ratio(name, gap, figure):.2f})"
+            # The figures are then rather those of another method.
+            fell = row.fell_back or 0.0
+            return f"{said}, {100 * fell:.0f} % the spline's" if fell > SPOILT else said
 
         return self._markdown(figure.upper(), cell)
 
