@@ -48,6 +48,23 @@ def test_moving_what_carries_it_moves_the_body_as_one(rigged):
     assert np.allclose(there.positions()[:, 0], placed[:, 0] if still else wanted[:, 0], atol=1e-9)
 
 
+@pytest.mark.parametrize("method", ["small", "cae", "spline"])
+def test_a_root_that_goes_along_does_so_in_a_gap(cmu_walk, method):
+    """It was a spline's, up to 10 cm beside hips that a network moved."""
+    rigged = under_root(cmu_walk, True)
+    aside = np.ptp((rigged.positions()[:, 1] - rigged.root)[:, [0, 2]], axis=0).max()
+    assert aside < 1e-6
+    done, same = (interpose.fill(clip, (60, 110), method=method).clip for clip in (rigged, cmu_walk))
+    assert np.abs((done.positions()[:, 1] - done.root)[:, [0, 2]]).max() < 0.005
+    assert np.abs(done.positions()[:, 1] - same.root).max() < 0.03
+
+
+def test_a_root_that_stays_does_so_in_a_gap(cmu_walk):
+    rigged = under_root(cmu_walk, False)
+    done = interpose.fill(rigged, (60, 110), method="small").clip
+    assert np.ptp(done.root, axis=0).max() < 1e-6
+
+
 def test_a_path_leads_the_hips(rigged, cmu_walk):
     gap, middle = (140, 190), 165
     point = cmu_walk.root[middle, [0, 2]] + [0.4, 0.2]

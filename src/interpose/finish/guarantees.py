@@ -27,6 +27,7 @@ from interpose.geometry.time import runs
 from interpose.methods.classical import Linear, Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Pin
+from interpose.skeletons.carrier import rooted
 
 # Positions further out than this (metres) are as good as no numbers.
 NOWHERE = 1e4
@@ -172,6 +173,7 @@ def complete(
             )
     if isinstance(method, Layer) and method.pins:
         current = pins.meet(current, known, method.pins)
+    current = rooted(current, known.translation)
     current = _merge(held(current, clip.source), hidden, known)
     for span in spans:
         for start, stop in mended.get(span.start, ()) if span.method == method.name else ():

@@ -14,6 +14,7 @@ from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
 from interpose.skeletons.mapping import find_mapping
 
+UNDER = 0.01  # metres over the floor by which a root is elsewhere than it should be under the hips, at most
 STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
 
 
@@ -69,6 +70,34 @@ def moved(clip: Clip, places: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> Cl
         rotation[:, joint] = turn
         translation[:, clip.translated.index(joint)] = place
     return clip.with_motion(rotation, translation)
+
+
+def rooted(clip: Clip, known: np.ndarray) -> Clip:
+    """The clip with a root above the hips where it belongs in frames where the place of neither is known.
+
+    Under them, or as far aside, if it is there in all known frames (what game engines call root motion); or
+    where it was, if it stands still in these. The body stays where it is.
+
+    known: (F, J) which local translations are.
+    """
+    hips = hips_of(clip.skeleton)
+    above = [joint for joint in clip.skeleton.ancestors(hips) if joint in clip.translated]
+    if not above or hips not in clip.translated:
+        return clip
+    root, (turned, placed) = above[-1], clip.kinematics()
+    aside = (placed[:, root] - placed[:, hips]) * [1.0, 0.0, 1.0]
+    both = np.asarray(known[:, [hips, root]].all(axis=1))
+    free = np.logical_not(known[:, [hips, *above]].any(axis=1))
+    if both.sum() < 2 or not free.any():
+        return clip
+    if np.ptp(placed[both, root], axis=0).max() < STILL:
+        there = np.where(free[:, None], placed[both, root].mean(axis=0), placed[:, root])
+    elif np.ptp(aside[both], axis=0).max() < UNDER:
+        there = placed[:, root] + (aside[both].mean(axis=0) - aside) * free[:, None]
+    else:
+        return clip
+    led = moved(clip, {root: (turned[:, root], there)})
+    return moved(led, {hips: (turned[:, hips], placed[:, hips])})
 
 
 def _still(clip: Clip, joint: int) -> bool:
