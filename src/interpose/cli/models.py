@@ -60,7 +60,7 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
         say("No trained models are installed: auto uses the spline.")
         return
     say_table(
-        ("model", "method", "rate", "longest gap", "licence", "trained on"),
+        ("model", "method", "rate", "sees at once", "licence", "trained on"),
         [
             (
                 card.name,
@@ -72,7 +72,7 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
             )
             for card in cards
         ],
-        right=("rate", "longest gap"),
+        right=("rate", "sees at once"),
     )
     say()
     say(f"interpose models {cards[0].name} prints the whole card.")
