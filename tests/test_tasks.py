@@ -389,7 +389,7 @@ def test_a_transition_without_strides_takes_as_long_as_feet_slide_least(cmu_walk
     chosen, hurried = tasks.stitch(clips), tasks.stitch(clips, least)
     assert least < len(chosen.clip) - 90 <= least + 30
     assert chosen.report.gaps[0].foot_slide < 0.5 * hurried.report.gaps[0].foot_slide
-    assert "feet slide least so, of 11 lengths" in chosen.clips[1].why
+    assert "feet slide least, of 11 lengths" in chosen.clips[1].why
 
 
 def test_other_values_of_the_clips_do_not_reach_each_other(cmu_walk):

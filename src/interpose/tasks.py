@@ -583,8 +583,8 @@ def _tried(
                 break
             slides[length] = report.foot_slide + GLIDING * (report.gliding or 0.0)
         lengths.append(min(slides, key=lambda length: slides[length], default=len(gap)))
-        longer = f"feet slide least so, of {len(slides)} lengths that were tried; at least "
-        whys.append(longer * (lengths[-1] > len(gap)) + way.why)
+        least = f"feet slide least, of {len(slides)} lengths tried (the shortest: {way.why})"
+        whys.append(least if lengths[-1] > len(gap) else way.why)
     return lengths, whys
 
 

@@ -187,7 +187,7 @@ def lay(
             count, why = unhurried_length(last, begins, before, turned)
             if step:
                 count = step.frames(count + 1) - 1
-                why = f"in step, a stride takes {step.stride / first.fps:.2f} s; at least {why}"
+                why = f"in step, a stride takes {step.stride / first.fps:.2f} s (the shortest: {why})"
         elif count is None:
             count, why = plausible_length(before, len(before) - 1, clip, 0)
         if step:
