@@ -23,6 +23,10 @@ class RequestError(InterposeError):
     """The request itself is wrong: an unknown joint, a range outside the clip, an existing output."""
 
 
+class NothingError(RequestError):
+    """There is nothing to do: no fault among several clips."""
+
+
 class FileError(InterposeError):
     """The input cannot be read: missing, binary, truncated or contradicting itself."""
 

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, to_json, write
 from interpose.cli.reading import Reading, describe, split_names
@@ -15,6 +16,7 @@ from interpose.errors import RequestError
 UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm", "turned": "degrees", "turned_most": "degrees"}
 
 
+@each
 def denoise(
     file: Path,
     /,
@@ -42,7 +44,8 @@ def denoise(
       interpose denoise take.bvh --frames 120:240 --player
 
     Args:
-        file: the clip (.bvh, .npz, .amc).
+        file: the clip (.bvh, .npz, .amc), or a folder of clips.
+        more: further ones: each is done by itself.
         strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
         joints: only these joints may turn, separated by commas; a root also moves. All without it.
         frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0; or seconds, 4s:5.3s.

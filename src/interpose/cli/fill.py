@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from interpose.cli.batch import each
 from interpose.cli.console import names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, finish, numbered
 from interpose.cli.reading import Reading, describe, details
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from interpose.observation import Gap, Pin
 
 
+@each
 def fill(
     file: Path,
     /,
@@ -62,7 +64,8 @@ def fill(
     Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
 
     Args:
-        file: the clip (.bvh, .npz, .amc).
+        file: the clip (.bvh, .npz, .amc), or a folder of clips.
+        more: further ones: each is done by itself.
         gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip; or those that --from gives.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.

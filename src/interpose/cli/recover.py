@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from interpose.cli.batch import each
 from interpose.cli.console import names, progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
@@ -17,6 +18,7 @@ from interpose.errors import RequestError
 SHOWN = 4  # losses, of many
 
 
+@each
 def recover(
     file: Path,
     /,
@@ -50,7 +52,8 @@ def recover(
       interpose recover suit.bvh --place
 
     Args:
-        file: the clip (.bvh, .npz, .amc).
+        file: the clip (.bvh, .npz, .amc), or a folder of clips.
+        more: further ones: each is done by itself.
         joints: the joints, separated by commas; without any, those that drop out.
         place: where the body is, is lost, and how it is turned is known, as of suits that know no places:
             feet that stand tell it. Without --frames it begins where the first frame is.

@@ -12,7 +12,7 @@ import numpy as np
 from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
-from interpose.errors import RequestError, unknown
+from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
 from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
@@ -113,7 +113,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
                 stuck
             )
             why += f" but {' and '.join(kinds)}, which `interpose recover` restores"
-        raise RequestError(f"nothing to fill in {file}", why, fix)
+        raise NothingError(f"nothing to fill in {file}", why, fix)
     lines = ["no --gap is given, so what a scan finds is filled:"]
     lines += [f"  {one.start}:{one.stop} {one.kind}, {one.note}" for one in found if one.kind not in NO_GAPS]
     lines += [f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in stuck]

@@ -5,12 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 from shlex import quote
 
+from interpose.cli.batch import each
 from interpose.cli.console import names, say, say_json, say_table, seconds
 from interpose.cli.reading import Reading, describe, details
 
 SHOWN = 10  # dropouts, of many
 
 
+@each
 def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
     """Find what looks missing: frozen runs, stray rest poses, joints that drop out for moments.
 
@@ -18,7 +20,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
       interpose scan take.bvh
 
     Args:
-        file: the clip (.bvh, .npz, .amc).
+        file: the clip (.bvh, .npz, .amc), or a folder of clips.
+        more: further ones: each is done by itself.
         json: print JSON for other programs.
     """
     from interpose.finish.feet import legs

@@ -1,0 +1,70 @@
+"""Verbs that take several clips, or a folder of them: each is done by itself, one after the other."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Iterable
+from functools import wraps
+from pathlib import Path
+from typing import Any
+
+from interpose.cli.console import complain, console, say
+from interpose.errors import FileError, InterposeError, NothingError, RequestError
+
+MOTION = (".bvh", ".npz", ".amc")
+
+
+def each(verb: Callable[..., int | None]) -> Callable[..., int]:
+    """The verb of one file, for several and for folders: what cannot be done is said, and the next one is.
+
+    Its exit code is the largest of all.
+    """
+
+    @wraps(verb)
+    def many(file: Path, /, *more: Path, **options: Any) -> int:
+        if not more and not file.is_dir():
+            return verb(file, **options) or 0
+        files = list(clips((file, *more)))
+        if options.get("output") is not None:
+            why = f"{len(files)} files are to be written"
+            raise RequestError(
+                "--output names one file", why, "Leave it out: each lies beside what it was made of."
+            )
+        codes = []
+        for path in files:
+            try:
+                codes.append(verb(path, **options) or 0)
+            except NothingError as error:
+                if not options.get("json"):
+                    say(error.what)
+                codes.append(0)
+            except InterposeError as error:
+                complain(error)
+                codes.append(error.exit_code)
+            if not options.get("json"):
+                say()
+        done = sum(code == 0 for code in codes)
+        console(stderr=True).print(f"{done} of {len(files)} files done")
+        return max(codes)
+
+    said = inspect.signature(verb)
+    first, *rest = said.parameters.values()
+    others = inspect.Parameter("more", inspect.Parameter.VAR_POSITIONAL, annotation="Path")
+    many.__signature__ = said.replace(parameters=[first, others, *rest])  # type: ignore[attr-defined]
+    many.__annotations__ = {**verb.__annotations__, "more": "Path"}
+    return many
+
+
+def clips(paths: Iterable[Path]) -> Iterable[Path]:
+    """Files, and in place of folders the motion files in them, without what verbs have made of these."""
+    for path in paths:
+        if not path.is_dir():
+            yield path
+            continue
+        held = sorted(one for one in path.iterdir() if one.suffix.lower() in MOTION and one.is_file())
+        # take.filled.bvh lies beside the take.bvh that it was made of.
+        found = [one for one in held if one.with_name(one.stem.rpartition(".")[0] + one.suffix) not in held]
+        if not found:
+            why = f"there is no motion file in it ({', '.join(MOTION)})"
+            raise FileError(f"cannot read {path}", why, "Name a folder with clips, or a clip.")
+        yield from found

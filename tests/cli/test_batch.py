@@ -1,0 +1,68 @@
+"""Several clips, and folders of them: each by itself, whatever becomes of the others."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+
+from interpose.formats import load, save
+
+
+@pytest.fixture
+def takes(take):  # type: ignore[no-untyped-def]
+    """A folder with two takes, one of which has a gap, and a damaged one."""
+    folder = take.parent / "takes"
+    folder.mkdir()
+    shutil.copy(take, folder / "a.bvh")
+    clip = load(take)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[60:80], translation[60:80] = rotation[59], translation[59]
+    save(clip.with_motion(rotation, translation), folder / "b.bvh")
+    (folder / "c.bvh").write_text("HIERARCHY\n")
+    (folder / "notes.txt").write_text("no clip")
+    return folder
+
+
+def test_a_folder_is_filled_file_by_file(run, takes):
+    done = run("fill", "takes", "--method", "spline")
+    assert done.code == 3, "one cannot be read"
+    assert "nothing to fill in takes/a.bvh" in done.out
+    assert "60:80 frozen" in done.out
+    assert "c.bvh" in done.err
+    assert "2 of 3 files done" in done.err
+    assert sorted(path.name for path in takes.glob("*.filled.*")) == ["b.filled.bvh", "b.filled.json"]
+    # What was made is no clip of the folder: nothing of it is filled once more.
+    (takes / "c.bvh").unlink()
+    again = run("fill", "takes", "--method", "spline")
+    assert again.code == 2
+    assert "--force" in again.err
+    assert run("fill", "takes", "--method", "spline", "--force").code == 0
+    assert not [*takes.glob("*.filled.filled.*")]
+
+
+def test_several_files_are_done_and_found_by_programs(run, takes):
+    done = run("scan", "takes/b.bvh", "takes/a.bvh", "--json")
+    assert done.code == 0
+    decoder, text, found = json.JSONDecoder(), done.out, []
+    while text.strip():
+        one, end = decoder.raw_decode(text.lstrip())
+        found.append(one)
+        text = text.lstrip()[end:]
+    assert [one["input"] for one in found] == ["takes/b.bvh", "takes/a.bvh"]
+    assert [sum(f["kind"] == "frozen" for f in one["findings"]) for one in found] == [1, 0]
+
+
+def test_one_output_for_several_files_is_refused(run, takes):
+    done = run("denoise", "takes/a.bvh", "takes/b.bvh", "-o", "out.bvh")
+    assert done.code == 2
+    assert "--output names one file" in done.err
+    assert not [*takes.parent.glob("out*")]
+
+
+def test_a_folder_without_clips_is_said(run, takes):
+    (takes / "empty").mkdir()
+    done = run("recover", "takes/empty")
+    assert done.code == 3
+    assert "no motion file in it" in done.err
