@@ -67,6 +67,20 @@ def test_files_tell_how_the_motion_leaves_and_meets_poses(run, take):
     assert 100 * np.linalg.norm(made - truth[60:91], axis=-1).mean() < 6
 
 
+def test_a_rest_pose_beside_a_pose_tells_nothing_of_its_motion(run, data, tmp_path):
+    """As the first frame of CMU's files."""
+    walk = load(data / "cmu_walk.bvh")
+    rotation = walk.rotation.copy()
+    rotation[0] = walk.skeleton.rest_rotation
+    save(walk.with_motion(rotation, walk.translation), tmp_path / "walk.bvh")
+    save(walk.slice(1, len(walk)), tmp_path / "cut.bvh")
+    for name, start in (("walk", 1), ("cut", 0)):
+        poses = ["--start", f"{name}.bvh#{start}", "--target", "cut.bvh#40", "--frames", "30"]
+        assert run("between", *poses, "-o", f"{name}.new.bvh").code == 0
+    one, other = (load(tmp_path / f"{name}.new.bvh").positions() for name in ("walk", "cut"))
+    assert np.abs(one - other).max() < 1e-3
+
+
 def test_a_length_is_proposed_with_its_reason(run, take):
     """As long as the walk itself took for the way, about."""
     done = run(

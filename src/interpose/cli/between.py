@@ -108,6 +108,7 @@ def _blocked(
     these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and a
     line for the user where the length was proposed."""
     from interpose import tasks
+    from interpose.observation.scan import strays
     from interpose.observation.timeline import bounded, fit, joined, plausible_length
 
     file, before, last = _pose(start, -1, reading)
@@ -142,7 +143,10 @@ def _blocked(
         raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {count}.")
     poses[count + 1] = end
     near, blocked = round(tasks.BESIDE * before.fps), tasks.block(poses)
-    parts = [before.slice(max(0, last - near), last), blocked, beside.slice(moment + 1, moment + 1 + near)]
+    # Rest poses and the like at the ends of files tell nothing of how it moves.
+    since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
+    until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
+    parts = [before.slice(since, last), blocked, beside.slice(moment + 1, until)]
     return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), said
 
 

@@ -58,7 +58,7 @@ def get(name: str) -> Method:
         own = {"name": name} if "name" in {field.name for field in fields(method)} else {}
         return cast("Method", replace(method, trained=card, **own))
     if name not in offered:
-        raise unknown("method", name, names())
+        raise unknown("method", name, [*names(), "a folder with weights"])
     entry = offered[name]
     try:
         return entry.load()()
