@@ -110,6 +110,18 @@ def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
     assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 
 
+@pytest.mark.parametrize("run", [1, 2, 3])
+@pytest.mark.parametrize("way", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.1, 0.1, -0.1)])
+def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
+    """It rises and falls by as much as medians of a tenth of a second let pass."""
+    clip = formats.load(data / "cmu_run.bvh")
+    for start in (6, 14, 21, 30):
+        translation = clip.translation.copy()
+        translation[start : start + run, 0] += way
+        lost = ~broken(clip.with_motion(clip.rotation, translation)).translation[:, 0]
+        assert np.flatnonzero(lost).tolist() == [*range(start, start + run)]
+
+
 def test_a_long_rest_pose_is_no_snap(cmu_walk):
     rotation = cmu_walk.rotation.copy()
     arm = cmu_walk.skeleton.index("LeftArm")
