@@ -102,6 +102,14 @@ def test_quaternions_are_unit_quaternions(factor):
     assert "w, x, y, z" in str(failed.value)
 
 
+def test_rounded_quaternions_are_made_unit_ones_and_others_stay():
+    exact = np.tile([0.6, 0.8, 0, 0], (3, 4, 1))
+    for rotation, same in ((exact, True), ((1.0004 * exact).astype(np.float16), False)):
+        made = Clip(skeleton(), rotation, np.zeros((3, 2, 3)), 30).rotation
+        assert np.abs(np.linalg.norm(made, axis=-1) - 1).max() < 1e-6
+        assert np.array_equal(made, rotation) is same
+
+
 def test_a_skeleton_from_arrays_is_one_and_bones_are_checked():
     made = Skeleton(["a", "b"], np.array([-1, 0]), np.zeros((2, 3)))
     assert Clip(made, np.tile([1.0, 0, 0, 0], (2, 2, 1)), np.zeros((2, 1, 3)), 30).positions().shape == (

@@ -96,9 +96,9 @@ class Skeleton:
         return above
 
 
-# Frames a second: who has fewer gives a frame time for a rate. How far the square of a quaternion's length
-# may be from 1: what is stored with three decimals is nearer.
-SLOWEST, UNIT = 0.1, 0.01
+# Frames a second: who has fewer gives a frame time for a rate, and nothing has more. How far the square of a
+# quaternion's length may be from 1: what is stored with three decimals is nearer, and is made 1 if it is not.
+SLOWEST, FASTEST, UNIT, ROUNDED = 0.1, 1e5, 0.01, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +141,10 @@ class Clip:
                 "translations do not fit",
                 f"expected ({frames}, {len(self.translated)}, 3), got {self.translation.shape}",
             )
-        if not isinstance(self.fps, int | float | np.number) or not SLOWEST <= self.fps < np.inf:
+        if not isinstance(self.fps, int | float | np.number) or not SLOWEST <= self.fps <= FASTEST:
             raise RequestError(
                 "the frame rate is wrong",
-                f"it is a number of frames a second, {SLOWEST:g} or more, and got {self.fps!r}",
+                f"it is a number of frames a second, {SLOWEST:g} to {FASTEST:g}, and got {self.fps!r}",
                 "Of a frame time give one over it.",
             )
         if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
@@ -162,6 +162,8 @@ class Clip:
                 f"that of {self.skeleton.names[joint]} at frame {frame} is {long}",
                 "Divide them by their lengths; they are w, x, y, z.",
             )
+        if np.abs(size - 1).max(initial=0.0) > ROUNDED:
+            fill(self, "rotation", self.rotation / np.sqrt(size)[..., None])
 
     def __len__(self) -> int:
         return self.rotation.shape[0]

@@ -117,6 +117,26 @@ def test_a_target_of_another_body_stands_on_the_floor(run, take):
     assert np.allclose(made.rotation[-1], source.rotation[80], atol=1e-5)
 
 
+def test_a_target_that_lies_still_on_another_body_is_met_at_rest(run, take):
+    """Frames of its file lie where the pose is laid, however far it is from where that file begins."""
+    source = load(take)
+    skeleton = replace(source.skeleton, rest_translation=1.1 * source.skeleton.rest_translation)
+    translation = 1.1 * source.translation
+    translation[60:] = translation[60]
+    rotation = source.rotation.copy()
+    rotation[60:] = rotation[60]
+    save(
+        replace(source, skeleton=skeleton, translation=translation, rotation=rotation, source=None),
+        take.with_name("large.bvh"),
+    )
+    done = run(
+        "between", "--start", "take.bvh#20", "--target", "large.bvh#90", "--frames", "60", "-o", "a.bvh"
+    )
+    assert done.code == 0
+    steps = np.linalg.norm(np.diff(load(take.with_name("a.bvh")).root, axis=0), axis=1)
+    assert steps[-1] * source.fps < 0.3
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter1d
 from tests.skeletons.rigs import TARGET, under_root
 
 import interpose
@@ -57,6 +58,19 @@ def test_a_root_that_goes_along_does_so_in_a_gap(cmu_walk, method):
     done, same = (interpose.fill(clip, (60, 110), method=method).clip for clip in (rigged, cmu_walk))
     assert np.abs((done.positions()[:, 1] - done.root)[:, [0, 2]]).max() < 0.005
     assert np.abs(done.positions()[:, 1] - same.root).max() < 0.03
+
+
+def test_a_root_that_goes_along_more_smoothly_stays_as_near(cmu_walk):
+    rigged = under_root(cmu_walk, True)
+    turned, placed = rigged.kinematics()
+    loose = moved(rigged, {0: (turned[:, 0], gaussian_filter1d(placed[:, 0], 12, axis=0))})
+    loose = moved(loose, {1: (turned[:, 1], placed[:, 1])})
+    assert np.allclose(loose.positions()[:, 1], rigged.positions()[:, 1])
+
+    def apart(clip):  # type: ignore[no-untyped-def]
+        return np.linalg.norm((clip.positions()[:, 1] - clip.root)[:, [0, 2]], axis=1).max()
+
+    assert apart(interpose.fill(loose, (50, 130), method="small").clip) < apart(loose) + 0.01
 
 
 def test_a_root_that_stays_does_so_in_a_gap(cmu_walk):

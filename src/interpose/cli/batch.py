@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext, redirect_stdout
 from functools import wraps
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from interpose.cli.console import complain, console, say
+from interpose.cli.console import complain, console, say, say_json
 from interpose.errors import FileError, InterposeError, NothingError, RequestError
 
 MOTION = (".bvh", ".npz", ".amc")
@@ -17,32 +20,39 @@ MOTION = (".bvh", ".npz", ".amc")
 def each(verb: Callable[..., int | None]) -> Callable[..., int]:
     """The verb of one file, for several and for folders: what cannot be done is said, and the next one is.
 
-    Its exit code is the largest of all.
+    Its exit code is the largest of all. With --json it prints one list, an entry for each file.
     """
 
     @wraps(verb)
     def many(file: Path, /, *more: Path, **options: Any) -> int:
         if not more and not file.is_dir():
             return verb(file, **options) or 0
-        files = list(clips((file, *more)))
+        files = [*{path.resolve(): path for path in clips((file, *more))}.values()]
         if options.get("output") is not None:
             why = f"{len(files)} files are to be written"
             raise RequestError(
                 "--output names one file", why, "Leave it out: each lies beside what it was made of."
             )
-        codes = []
+        codes, reports = [], []
         for path in files:
+            said = StringIO()
             try:
-                codes.append(verb(path, **options) or 0)
+                with redirect_stdout(said) if options.get("json") else nullcontext():
+                    codes.append(verb(path, **options) or 0)
+                reports.append(json.loads(said.getvalue() or "null"))
             except NothingError as error:
+                reports.append({"input": str(path), "nothing": error.what})
+                codes.append(0)
                 if not options.get("json"):
                     say(error.what)
-                codes.append(0)
             except InterposeError as error:
+                reports.append({"input": str(path), "error": error.what})
                 complain(error)
                 codes.append(error.exit_code)
             if not options.get("json"):
                 say()
+        if options.get("json"):
+            say_json(reports)
         done = sum(code == 0 for code in codes)
         console(stderr=True).print(f"{done} of {len(files)} files done")
         return max(codes)

@@ -109,7 +109,8 @@ def _blocked(
     line for the user where the length was proposed."""
     from interpose import tasks
     from interpose.observation.scan import strays
-    from interpose.observation.timeline import bounded, fit, joined, plausible_length
+    from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
+    from interpose.skeletons.carrier import hips_of
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
@@ -146,7 +147,14 @@ def _blocked(
     # Rest poses and the like at the ends of files tell nothing of how it moves.
     since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
     until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
-    parts = [before.slice(since, last), blocked, beside.slice(moment + 1, until)]
+    # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
+    there, here = (
+        hips[0, hips_of(held.skeleton)]
+        for hips in (end.positions(), beside.slice(moment, moment + 1).positions())
+    )
+    shift = (float(there[0] - here[0]), 0.0, float(there[2] - here[2]))
+    on = Placement(shift=shift).of(beside.slice(moment + 1, until))
+    parts = [before.slice(since, last), blocked, on]
     return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), said
 
 

@@ -13,7 +13,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import names, progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, split_names
-from interpose.errors import RequestError
+from interpose.errors import NothingError, RequestError
 
 SHOWN = 4  # losses, of many
 
@@ -93,7 +93,7 @@ def recover(
         fix = "Name joints that are lost for longer: --joints LeftArm."
         if len(clip) > 1 and float(np.ptp(clip.translation, axis=0).max()) < STILL:
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
-        raise RequestError(
+        raise NothingError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose, spikes, or jumps away and back within a second",
             f"interpose fill {file} fills what else is missing." if others else fix,

@@ -14,7 +14,7 @@ from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
 from interpose.skeletons.mapping import find_mapping
 
-UNDER = 0.01  # metres over the floor by which a root is elsewhere than it should be under the hips, at most
+NEAR = 0.3  # metres over the floor within which a root stays that goes along with the hips
 STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
 
 
@@ -75,8 +75,8 @@ def moved(clip: Clip, places: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> Cl
 def rooted(clip: Clip, known: np.ndarray) -> Clip:
     """The clip with a root above the hips where it belongs in frames where the place of neither is known.
 
-    Under them, or as far aside, if it is there in all known frames (what game engines call root motion); or
-    where it was, if it stands still in these. The body stays where it is.
+    As far aside of them as before and after, if it goes along with them in all known frames (what game
+    engines call root motion); or where it was, if it stands still in these. The body stays where it is.
 
     known: (F, J) which local translations are.
     """
@@ -92,8 +92,10 @@ def rooted(clip: Clip, known: np.ndarray) -> Clip:
         return clip
     if np.ptp(placed[both, root], axis=0).max() < STILL:
         there = np.where(free[:, None], placed[both, root].mean(axis=0), placed[:, root])
-    elif np.ptp(aside[both], axis=0).max() < UNDER:
-        there = placed[:, root] + (aside[both].mean(axis=0) - aside) * free[:, None]
+    elif np.ptp(aside[both], axis=0).max() < NEAR:
+        at = np.flatnonzero(both)
+        usual = np.stack([np.interp(np.arange(len(clip)), at, axis[at]) for axis in aside.T], axis=1)
+        there = placed[:, root] + (usual - aside) * free[:, None]
     else:
         return clip
     led = moved(clip, {root: (turned[:, root], there)})
