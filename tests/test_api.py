@@ -120,6 +120,8 @@ def test_what_does_not_fit_is_said(cmu_walk):
         (lambda: interpose.fill(cmu_walk, seen), "does not fit the clip"),
         (lambda: interpose.Observation(np.ones((5, 3, 4)), np.ones((5, 3, 4))), "does not fit"),
         (lambda: interpose.forecast(cmu_walk, 30.5), "whole number"),
+        (lambda: interpose.forecast(cmu_walk, "30"), "whole number"),
+        (lambda: interpose.between(cmu_walk, [0, 30.5, 75]), "no frame 30.5"),
         (lambda: interpose.fill(cmu_walk, (20, 60), seed=-1), "seed -1"),
     ):
         with pytest.raises(interpose.RequestError, match=said):

@@ -347,7 +347,7 @@ def between(
         RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
     """
     chosen = sorted(set(keys))
-    if bad := [key for key in chosen if not 0 <= key < len(clip)]:
+    if bad := [key for key in chosen if key != int(key) or not 0 <= key < len(clip)]:
         raise RequestError(
             f"there is no frame {bad[0]}",
             f"the clip has {len(clip)} frames, counted from 0",
@@ -449,7 +449,7 @@ def forecast(
     """
     frames = round(AHEAD * clip.fps) if frames is None else frames
     for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
-        if count < 1 or count != int(count):
+        if not isinstance(count, int | np.integer) or count < 1:
             raise RequestError(
                 f"cannot forecast {count} {what}s",
                 "it is a whole number from 1 on",
