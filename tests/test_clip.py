@@ -108,6 +108,12 @@ def test_rounded_quaternions_are_made_unit_ones_and_others_stay():
         made = Clip(skeleton(), rotation, np.zeros((3, 2, 3)), 30).rotation
         assert np.abs(np.linalg.norm(made, axis=-1) - 1).max() < 1e-6
         assert np.array_equal(made, rotation) is same
+    one = exact + 1e-9
+    mixed = np.where(np.arange(4)[:, None] == 2, 1.0004 * exact, one)
+    others = [0, 1, 3]
+    assert np.array_equal(
+        Clip(skeleton(), mixed, np.zeros((3, 2, 3)), 30).rotation[:, others], one[:, others]
+    )
 
 
 def test_a_skeleton_from_arrays_is_one_and_bones_are_checked():

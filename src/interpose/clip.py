@@ -162,7 +162,8 @@ class Clip:
                 f"that of {self.skeleton.names[joint]} at frame {frame} is {long}",
                 "Divide them by their lengths; they are w, x, y, z.",
             )
-        if np.abs(size - 1).max(initial=0.0) > ROUNDED:
+        if (rounded := np.abs(size - 1) > ROUNDED).any():
+            size = np.where(rounded, size, 1.0)  # all others keep their last digit
             fill(self, "rotation", self.rotation / np.sqrt(size)[..., None])
 
     def __len__(self) -> int:
