@@ -148,11 +148,11 @@ def _blocked(
     since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
     until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
     # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
-    there, here = (
+    laid, lay = (
         hips[0, hips_of(held.skeleton)]
         for hips in (end.positions(), beside.slice(moment, moment + 1).positions())
     )
-    shift = (float(there[0] - here[0]), 0.0, float(there[2] - here[2]))
+    shift = (float(laid[0] - lay[0]), 0.0, float(laid[2] - lay[2]))
     on = Placement(shift=shift).of(beside.slice(moment + 1, until))
     parts = [before.slice(since, last), blocked, on]
     return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), said

@@ -152,13 +152,13 @@ def _away(values: np.ndarray, far: float, longest: int) -> np.ndarray:
 
 
 def _spikes(values: np.ndarray, far: float, second: int) -> tuple[np.ndarray, np.ndarray]:
-    """The frames (F,) in which values (F, d) are far from the median (F, d) of those around them.
+    """The frames (F,) in which rotations (F, 4) are far from the median (F, 4) of those around them.
 
     Source: Hampel's identifier; the scale is the median within a second on either side.
     """
-    own = rotations.continuous(values) if values.shape[-1] == 4 else values
+    own = rotations.continuous(values)
     middle = medians(own, AROUND, "edge")
-    middle = rotations.normalize(middle) if values.shape[-1] == 4 else middle
+    middle = rotations.normalize(middle)
     off = _apart(own, middle)
     spikes = off > far + TIMES * ndimage.median_filter(off, size=2 * second + 1, mode="nearest")
     steps = _apart(own[1:], own[:-1])
