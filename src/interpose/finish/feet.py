@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish import measures
-from interpose.finish.windows import ramp
+from interpose.finish.windows import envelope, ramp, rounded, spread
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
@@ -32,9 +31,9 @@ BLENDS = (0.15, 0.25, 0.40)
 # Metres that a foot may sink below the lowest stances nearby (the bound is rounded off over as much), and by
 # which it clears the floor once it is twice as fast as QUICK (metres a second). A method that knows when feet
 # stand also knows how high they go: lifted as far as others' they slide half as much as people's do, and are
-# off by a hundredth more. SOFT: the share of BLEND over which it comes.
+# off by a hundredth more.
 OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.02)
-QUICK, SOFT = 0.50, 0.5
+QUICK = 0.50
 # A contact that the method takes for less likely than this is none.
 LIKELY = 0.5
 # Seconds of observed motion beside a gap in which stances are looked for.
@@ -240,8 +239,8 @@ def plant(
         shift = _hold(feet, planted, movable, clip.fps, over)
         speeds = measures.speed(feet + shift, clip.fps)
         lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
-        lift = _smooth(_lift((lowest - feet[..., 1]).max(axis=1), sink), over)
-        shift[..., 1] += (lift * np.prod(_envelope(movable, over), axis=0))[:, None]
+        lift = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
+        shift[..., 1] += (lift * np.prod(envelope(movable, over), axis=0))[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = _reach(
@@ -262,7 +261,7 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
     blend = max(2, round(over))
     time = np.arange(frames)
     still = measures.speed(feet, fps) < STILL
-    away, towards = _envelope(movable, over)
+    away, towards = envelope(movable, over)
     shifts, shares = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
     for joint in range(2):
         held = [run for run in runs(planted[:, joint]) if movable[slice(*run)].any()]
@@ -290,32 +289,6 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
             shares[:, joint] = np.maximum(shares[:, joint], share)
     shifts[..., 1] = 0.0
     return shifts + (1 - shares)[..., None] * shifts[:, ::-1]
-
-
-def _smooth(lift: np.ndarray, over: float) -> np.ndarray:
-    """A lift (F,) that is nowhere less but comes and goes over some frames."""
-    reach = max(1, round(SOFT * over))
-    wide = ndimage.maximum_filter1d(lift, 2 * reach + 1, mode="nearest")
-    return ndimage.gaussian_filter1d(wide, reach / 2, mode="nearest")
-
-
-def _lift(depth: np.ndarray, sink: float) -> np.ndarray:
-    """How far to lift what lies `depth` below the floor: max(depth, 0), its corner rounded off by `sink`."""
-    return np.where(depth > sink, depth, np.maximum(depth + sink, 0.0) ** 2 / (4 * sink))
-
-
-def _envelope(movable: np.ndarray, over: float) -> tuple[np.ndarray, np.ndarray]:
-    """Two shares (F,): away from the seam before, and towards the one after, of each run of movable frames.
-
-    0 where nothing may move, growing smoothly to 1 over `over` frames; an end of the clip is no seam.
-    """
-    frames = len(movable)
-    away, towards = np.zeros(frames), np.zeros(frames)
-    for start, stop in runs(movable):
-        time = np.arange(start, stop)
-        away[start:stop] = ramp((time - start + 1) / over) if start > 0 else 1.0
-        towards[start:stop] = ramp((stop - time) / over) if stop < frames else 1.0
-    return away, towards
 
 
 def _reach(

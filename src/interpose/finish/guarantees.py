@@ -13,7 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, jumps, measures, notes, penetration, pins, seams
+from interpose.finish import feet, floor, jumps, measures, notes, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
@@ -136,6 +136,7 @@ def complete(
             unheld.update(_slides(current, known, span, gaps))
             if source is not opinion or not (isinstance(method, Layer) and method.stands):
                 _plant(current, known, span, bounds, raw.stands if source is opinion else None)
+                _lift(current, known, span)
         for _ in range(ROUNDS):
             for span in chosen:
                 jumps.soften(current, known, span, limit)
@@ -450,6 +451,12 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: S
     raw = source.slice(lo, hi)
     if seams.difference(raw, base, seen, inner)[0] > seams.EXACT:
         write(current, _merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
+
+
+def _lift(current: Clip, known: Observation, span: Span) -> None:
+    """Lift what a span has under the floor."""
+    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
+    write(current, floor.lifted(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
 
 
 def _plant(

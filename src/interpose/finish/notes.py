@@ -7,10 +7,9 @@ import math
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, measures
+from interpose.finish import feet, floor, measures
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
-from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of
 
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
@@ -46,15 +45,14 @@ def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
 
 
 def _deepest(part: Clip, seen: Observation, start: int, gap: Gap) -> tuple[float, int, int] | None:
-    """By how many metres the lowest joint of a gap that begins at frame `start` is below the lowest that is
-    observed, which joint, and at which frame; None without any. What a foot does `feet.sunk` tells."""
-    heights, observed = part.positions()[..., 1], seen.positions(part.skeleton)
-    joints = [j for j in find_mapping(part.skeleton).mapped[1] if j not in feet.ends(part.skeleton)]
-    free = np.where(observed, np.inf, heights)[start : start + len(gap), joints]
-    if not observed.any() or not np.isfinite(free).any():
+    """By how many metres the deepest joint of a gap that begins at frame `start` is under the floor, which
+    joint, and at which frame; None without any. What a foot does `feet.sunk` tells."""
+    deep, joints = floor.depth(part, seen)
+    free = deep[start : start + len(gap)]
+    if not free.size:
         return None
-    frame, joint = np.unravel_index(int(free.argmin()), free.shape)
-    return float(heights[observed].min() - free[frame, joint]), joints[joint], start + int(frame)
+    frame, joint = np.unravel_index(int(free.argmax()), free.shape)
+    return float(free[frame, joint]), joints[joint], start + int(frame)
 
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:

@@ -1,0 +1,90 @@
+"""Who lies, crawls or falls stays on the floor, and nothing else is changed by it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.finish import complete, feet, floor, measures
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+
+GAP = Gap(70, 110)
+
+
+class Said:
+    """A method that says a given motion."""
+
+    name = "said"
+
+    def __init__(self, clip):
+        self.clip = clip
+
+    def refuses(self, clip, gap):
+        return None
+
+    def complete(self, clip, observation, seed=None):
+        return Raw(self.clip)
+
+
+@pytest.fixture
+def lying(cmu_walk):
+    """A body that lies still on its front."""
+    rotation = np.broadcast_to(cmu_walk.rotation[60], cmu_walk.rotation.shape).copy()
+    rotation[:, 0] = rotations.multiply(rotations.about("X", np.array(np.pi / 2)), rotation[:, 0])
+    return cmu_walk.with_motion(rotation, np.zeros_like(cmu_walk.translation))
+
+
+def sunk(clip, by=0.12):
+    """The same, under the floor in the middle of the gap."""
+    time = np.arange(len(clip))
+    wave = np.clip((time - GAP.start + 1) / 20, 0, 1) * np.clip((GAP.stop - time) / 20, 0, 1)
+    translation = clip.translation.copy()
+    translation[:, 0, 1] -= by * np.sin(np.pi / 2 * wave) ** 2
+    return clip.with_motion(clip.rotation, translation)
+
+
+def test_a_body_under_the_floor_is_lifted_smoothly_with_its_bones_and_all_that_is_known(lying):
+    seen, said = Observation.from_gaps(lying, [GAP]), sunk(lying)
+    done = complete(lying, seen, Said(said))
+    inside = slice(GAP.start, GAP.stop)
+    before, after = (floor.depth(one, seen)[0][inside].max() for one in (said, done.clip))
+    assert before > 0.11
+    assert after < 0.03
+    assert not any("under the floor" in note for note in done.report.gaps[0].notes)
+    assert done.report.gaps[0].method == "said"
+    for at in (slice(0, GAP.start), slice(GAP.stop, None)):
+        assert done.clip.rotation[at].tobytes() == lying.rotation[at].tobytes()
+    jumps = [measures.acceleration(one.positions())[inside].max() for one in (said, done.clip)]
+    assert jumps[1] < jumps[0] + 0.005
+    # As little as it takes: what was above the floor is where it was but for what hangs on the rest.
+    moved = np.linalg.norm(done.clip.positions() - said.positions(), axis=-1)[inside]
+    assert moved.max() < 0.15
+
+
+def test_who_is_above_the_floor_is_not_touched(lying, cmu_walk):
+    for clip in (lying, cmu_walk):
+        seen = Observation.from_gaps(clip, [GAP])
+        assert floor.lifted(clip, seen, (GAP.start, GAP.stop)) is clip
+
+
+def test_feet_of_who_stands_have_other_rules(cmu_walk):
+    seen, low = Observation.from_gaps(cmu_walk, [GAP]), sunk(cmu_walk)
+    deep, joints = floor.depth(low, seen)
+    ends = [joints.index(joint) for joint in feet.ends(cmu_walk.skeleton)]
+    assert deep[:, ends].max() <= 0
+
+
+def test_where_the_floor_is_and_which_way_a_body_faces_makes_no_difference(lying):
+    def elsewhere(clip):
+        rotation, translation = clip.rotation.copy(), turn(clip.translation, np.array(1.0))
+        translation += [3.0, 1.5, 2.0]
+        rotation[:, 0] = rotations.multiply(rotations.about("Y", np.array(1.0)), rotation[:, 0])
+        return clip.with_motion(rotation, translation)
+
+    seen, span = Observation.from_gaps(lying, [GAP]), (GAP.start, GAP.stop)
+    here = floor.lifted(sunk(lying), seen, span)
+    there = floor.lifted(elsewhere(sunk(lying)), seen, span)
+    np.testing.assert_allclose(there.positions(), elsewhere(here).positions(), atol=1e-6)
