@@ -49,6 +49,16 @@ def test_feet_stay_and_velocities_do_not_jump(cmu_walk):
     assert jumps.max() < 2 * seams.PEAKS * seams.limit(cmu_walk, seen)
 
 
+def test_a_network_goes_to_a_pin_and_back_and_does_not_jump_there_for_a_frame(cmu_walk):
+    """The hand comes and goes by .4 m within half a second each: 13 m/s^2; in a single frame 39."""
+    hand = cmu_walk.skeleton.index("LeftHand")
+    free = tasks.fill(cmu_walk, [GAP], "small").clip.positions()
+    pin = Pin("LeftHand", np.array([85]), free[[85], hand] + [0.0, 0.4, 0.1])
+    done = tasks.fill(cmu_walk, [GAP], "small", pins=[pin]).clip.positions()
+    ways = [np.linalg.norm(np.diff(some[83:88, hand], n=2, axis=0), axis=-1).max() for some in (free, done)]
+    assert (ways[1] - ways[0]) * cmu_walk.fps**2 < 13
+
+
 def test_a_place_is_held_for_as_long_as_it_is_pinned(cmu_walk):
     frames = np.arange(80, 90)
     where = np.tile(lifted(cmu_walk).position, (10, 1))

@@ -285,14 +285,17 @@ def _pinned(
     """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
     pins.check(clip, observation)
     asked, free = pins.merged(observation.pins), replace(observation, pins=())
-    told = _Told(method.name, method, asked)
-    body = complete(clip, free, told, seed, fallback, limit, path, first)
     known = _trusted(clip, free)
+    unled = complete(clip, free, method, seed, fallback, limit, path, first)
+    # A network that is told of one frame changes that frame: it is told the whole way there and back.
+    ways = pins.ways(unled.clip, known, asked)
+    told = _Told(method.name, method, ways)
+    body = complete(clip, free, told, seed, fallback, limit, path, first) if ways else unled
     met = pins.meet(body.clip, known, asked)
     layer = Layer(method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
     done = _told_of(body, complete(clip, free, layer, seed, layer, limit, first=first))
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
-    away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(body.clip, asked)}
+    away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(unled.clip, asked)}
     way = over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:

@@ -113,10 +113,7 @@ def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
         known: what may not be changed.
         pins: as `check` lets them pass, `merged`.
     """
-    for start, stop in runs(~known.frames):
-        # The frames beside a gap are its edges: nothing of them can change.
-        lo, hi = max(0, start - 1), min(len(clip), stop + 1)
-        edges = [frame - lo for frame in (start - 1, stop) if lo <= frame < hi]
+    for (start, stop), (lo, hi), edges in _gaps(known):
         if some := [one for pin in pins if len((one := pin.slice(lo, hi)).frames)]:
             part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges)
             rotation, translation = clip.rotation.copy(), clip.translation.copy()
@@ -124,6 +121,22 @@ def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
             translation[start:stop] = part.translation[start - lo : stop - lo]
             clip = clip.with_motion(rotation, translation)
     return clip
+
+
+def ways(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> tuple[Pin, ...]:
+    """Pins at all frames of the gaps in which there are some: the ways of the clip's joints by their places.
+
+    Arguments as in `meet`.
+    """
+    placed, found = clip.positions(), []
+    for pin in (pin for pin in pins if pin.position is not None):
+        joint = clip.skeleton.index(pin.joint)
+        for (start, stop), (lo, hi), edges in _gaps(known):
+            if len((one := pin.slice(lo, hi)).frames):
+                way = placed[lo:hi, joint]
+                way = way + _between(hi - lo, one.frames, one.position - way[one.frames], edges)
+                found.append(Pin(pin.joint, np.arange(start, stop), way[start - lo : stop - lo]))
+    return tuple(found)
 
 
 def missed(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]]:
@@ -134,6 +147,14 @@ def missed(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]
             off = np.linalg.norm(placed[pin.frames, clip.skeleton.index(pin.joint)] - pin.position, axis=1)
             for frame, distance in zip(pin.frames, off):
                 yield pin, int(frame), float(distance)
+
+
+def _gaps(known: Observation) -> Iterator[tuple[tuple[int, int], tuple[int, int], list[int]]]:
+    """Of each gap the frames from start to before stop, those with the ones beside it, and which of these are
+    its edges, of which nothing can change."""
+    for start, stop in runs(~known.frames):
+        lo, hi = max(0, start - 1), min(len(known.frames), stop + 1)
+        yield (start, stop), (lo, hi), [frame - lo for frame in (start - 1, stop) if lo <= frame < hi]
 
 
 def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) -> Clip:
