@@ -88,8 +88,7 @@ def fill(
         seed: for methods that sample.
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
-        action: what the motion in the gaps is, for methods that know actions; "auto" then is "cmib" beside
-            lone keys, and "small" amid motion.
+        action: what the motion in the gaps is, for methods that know actions; "auto" then is one of them.
         parts: poses of single joints that other clips give inside of the gaps.
         path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
@@ -620,7 +619,7 @@ def plan(
         open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
         name, note = methods.get(number, method), None
         if name == "auto" and action:
-            chosen = auto.choose_told(clip, lead, _lone(observation, gap), action)
+            chosen = auto.choose_told(clip, lead, _turned(clip, observation, gap), action)
         elif name == "auto":
             chosen, note = _suited(clip, observation, gap, lead)
         else:
@@ -635,14 +634,17 @@ def plan(
     return jobs
 
 
+def _turned(clip: Clip, observation: Observation, gap: Gap) -> float:
+    """By how many degrees the body turns from one lone key to the other; 0 where there are not two."""
+    return auto.turns(clip, gap) if _lone(observation, gap) == 2 and gap.joints is None else 0.0
+
+
 def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[Method, str | None]:
     """The method that `auto` takes for a gap, and why no network, where one would be its own."""
     if observation.rotation[gap.start : gap.stop].all():
         # What the body stands on tells more of where it is than any method.
         return Spline(), None
-    lone = _lone(observation, gap)
-    turned = auto.turns(clip, gap) if lone == 2 and gap.joints is None else 0.0
-    chosen, note = auto.choose(clip, lead, lone, turned)
+    chosen, note = auto.choose(clip, lead, _lone(observation, gap), _turned(clip, observation, gap))
     if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
         # Too short for a network alone, amid joints that are lost for longer.
         return auto.choose(clip, parted)

@@ -60,8 +60,8 @@ def between(
             the last anchor on).
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
-        action: what the motion is; `interpose models cmib` lists what there is. Asks for the method cmib, or
-            small where motion is known on both sides.
+        action: what the motion is; `interpose models small` lists what there is. A word does little: another
+            key says more.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).

@@ -90,7 +90,7 @@ def _lines(value: Any, indent: str = "") -> list[str]:
             for one in item:
                 first, *rest = _lines(one, indent + "    ")
                 lines += [f"{indent}  - {first.strip()}", *rest]
-        elif isinstance(item, list) and len(item) > 24:
+        elif isinstance(item, list) and len(item) > 24 and not isinstance(item[0], str):
             lines.append(f"{indent}{title}: {len(item)} numbers, see --json")
         elif isinstance(item, list):
             lines.append(f"{indent}{title}: {', '.join(str(one) for one in item if one != '')}")

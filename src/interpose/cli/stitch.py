@@ -78,7 +78,7 @@ def stitch(
         frames: how many frames to generate: one number, or one for each gap; auto chooses what is unhurried.
         align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
         loop: lead back to the beginning as well, so that the motion can be played round and round.
-        action: what the generated motion is; `interpose models cmib` lists what there is.
+        action: what the generated motion is; `interpose models small` lists what there is.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
