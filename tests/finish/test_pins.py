@@ -59,6 +59,29 @@ def test_a_network_goes_to_a_pin_and_back_and_does_not_jump_there_for_a_frame(cm
     assert (ways[1] - ways[0]) * cmu_walk.fps**2 < 13
 
 
+def test_a_hand_slows_down_to_the_place_that_it_holds_while_the_body_goes_on(cmu_walk):
+    """Gone to at rest against the body, it would stop within a frame: 15 m/s^2."""
+    gap, hand, frames = Gap(60, 120), cmu_walk.skeleton.index("LeftHand"), np.arange(85, 95)
+    free = tasks.fill(cmu_walk, [gap], "small").clip.positions()
+    pin = Pin("LeftHand", frames, np.tile(free[90, hand] + [0.0, 0.1, 0.0], (10, 1)))
+    done = tasks.fill(cmu_walk, [gap], "small", pins=[pin]).clip.positions()
+    jumps = np.linalg.norm(np.diff(done[:, hand], n=2, axis=0), axis=-1)[80:90]
+    assert jumps.max() * cmu_walk.fps**2 < 8
+
+
+def test_the_rest_of_the_body_makes_room_evenly(cmu_walk):
+    """A hand at the ear, where frames that are solved each for itself throw the elbow about: 42 m/s^2."""
+    gap, hand, head = Gap(60, 120), *(cmu_walk.skeleton.index(name) for name in ("LeftHand", "Head"))
+    free = tasks.fill(cmu_walk, [gap], "small").clip.positions()
+    sides = [free[85, cmu_walk.skeleton.index(side + "Arm")] for side in ("Left", "Right")]
+    side = (sides[0] - sides[1]) / np.linalg.norm(sides[0] - sides[1])
+    pin = Pin("LeftHand", np.array([85]), [free[85, head] + 0.05 * side])
+    done = tasks.fill(cmu_walk, [gap], "small", pins=[pin]).clip.positions()
+    np.testing.assert_allclose(done[85, hand], pin.position[0], atol=1e-3)
+    elbow = done[gap.start - 2 : gap.stop + 1, cmu_walk.skeleton.index("LeftForeArm")]
+    assert np.linalg.norm(np.diff(elbow, n=2, axis=0), axis=-1).max() * cmu_walk.fps**2 < 25
+
+
 def test_a_place_is_held_for_as_long_as_it_is_pinned(cmu_walk):
     frames = np.arange(80, 90)
     where = np.tile(lifted(cmu_walk).position, (10, 1))

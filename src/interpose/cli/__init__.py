@@ -15,6 +15,10 @@ from collections.abc import Sequence
 from interpose import __version__
 from interpose.errors import InterposeError
 
+# Before NumPy is imported: its matrices are small here, and threads that wait for cores that others use make
+# a fill many times as long.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 # Verbs by group, in the order of the help; `app` finds each in the module of its name.
 VERBS = {
     "Your clips": {

@@ -15,7 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.finish import feet
-from interpose.finish.solve import BLOCK, refine
+from interpose.finish.solve import BLOCK, refine, refine_steadily
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods.bodies import no_humanoid
@@ -25,9 +25,14 @@ from interpose.skeletons import find_mapping
 # How much the place of every other joint counts beside a pin, round by round: first all give way together,
 # then the pins alone decide; and how many times more those of feet do.
 SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
+# Seconds over which a joint slows down to a place that it is to hold while the body goes on.
+LEAD = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
 # after those at most.
 STEP, SHORT, STILL, ROUNDS = 0.25, 0.005, 1e-6, 40
+# How much second differences of what is done count, squared, against metres squared, where all frames are
+# solved together; and up to how many frames are.
+STEADY, TOGETHER = 1.0, 2000
 
 
 def check(clip: Clip, observation: Observation) -> None:
@@ -134,7 +139,7 @@ def ways(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> tuple[Pin, ..
         for (start, stop), (lo, hi), edges in _gaps(known):
             if len((one := pin.slice(lo, hi)).frames):
                 way = placed[lo:hi, joint]
-                way = way + _between(hi - lo, one.frames, one.position - way[one.frames], edges)
+                way = way + _between(hi - lo, one.frames, one.position - way[one.frames], edges, clip.fps)
                 found.append(Pin(pin.joint, np.arange(start, stop), way[start - lo : stop - lo]))
     return tuple(found)
 
@@ -179,7 +184,9 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) ->
     start = clip.positions()
     wanted, off = start[:, joints].copy(), np.zeros((len(clip), len(joints)))
     for pin, joint in zip(pins, pinned):
-        change = _between(len(clip), np.asarray(pin.frames), pin.position - start[pin.frames, joint], edges)
+        change = _between(
+            len(clip), np.asarray(pin.frames), pin.position - start[pin.frames, joint], edges, clip.fps
+        )
         wanted[:, joints.index(joint)] += change
         off[:, joints.index(joint)] += np.abs(change).max(axis=1)
     moved = np.flatnonzero(off.max(axis=1) > 1e-6)
@@ -187,13 +194,42 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) ->
         return clip
     rows = [joints.index(joint) for joint in pinned]
     heavy = [joints.index(joint) for joint in feet.ends(skeleton) if joint in joints]
-    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    done = clip
+    if len(clip) <= TOGETHER:
+        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy)
+    rotation, translation = done.rotation.copy(), done.translation.copy()
     for i in range(0, len(moved), BLOCK):
         at = moved[i : i + BLOCK]
-        part = clip.with_motion(clip.rotation[at], clip.translation[at])
+        part = done.with_motion(done.rotation[at], done.translation[at])
         seen = Observation(known.rotation[at], known.translation[at])
         rotation[at], translation[at] = _approach(part, seen, joints, wanted[at], rows, heavy)
     return clip.with_motion(rotation, translation)
+
+
+def _steadily(
+    clip: Clip,
+    known: Observation,
+    joints: tuple[int, ...],
+    start: np.ndarray,
+    wanted: np.ndarray,
+    rows: list[int],
+    heavy: list[int],
+) -> Clip:
+    """The joints in `rows` near to where they are wanted (F, n, 3), not at `start`, all frames together.
+
+    Solved each for itself, frames differ in what the pins leave open: where an elbow points, and how far a
+    head makes room.
+    """
+    led, done = clip, np.zeros((len(clip), 1))
+    count = int(np.ceil(np.linalg.norm(wanted - start, axis=-1).max() / STEP))
+    for step, share in [*((k / count, SHARES[0]) for k in range(1, count)), *((1.0, s) for s in SHARES)]:
+        weights = np.full(wanted.shape[:2], share)
+        weights[:, heavy] *= FEET
+        weights[:, rows] = 1.0
+        goal = start + step * (wanted - start)
+        led, done = refine_steadily(led, known, joints, goal, weights, done, STEADY * share / SHARES[0])
+    off = [np.linalg.norm(wanted[:, rows] - p[:, rows]).sum() for p in (start, led.positions()[:, joints])]
+    return led if off[1] < off[0] else clip  # what is out of reach may swing
 
 
 def _approach(
@@ -241,7 +277,7 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     joint = clip.skeleton.index(pin.joint)
     turned, _ = clip.kinematics()
     off = rotations.log(rotations.multiply(pin.orientation, rotations.conjugate(turned[pin.frames, joint])))
-    change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges))
+    change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges, clip.fps))
     done, parent = rotations.multiply(change, turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
         done = rotations.multiply(rotations.conjugate(turned[:, parent]), done)
@@ -250,20 +286,36 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     return clip.with_motion(rotation, clip.translation)
 
 
-def _between(frames: int, at: np.ndarray, values: np.ndarray, edges: list[int]) -> np.ndarray:
-    """(F, n) through values (k, n) at some frames, nothing at the edges, smooth and never further off.
+def _between(frames: int, at: np.ndarray, values: np.ndarray, edges: list[int], fps: float) -> np.ndarray:
+    """(F, n) through values (k, n) at some frames, nothing at the edges, smooth and hardly further off.
 
-    At an end that is no edge, as where a clip ends within the gap, the value holds.
+    At an end that is no edge, as where a clip ends within the gap, the value holds. What holds a place while
+    the body goes on changes from frame to frame: it is come to, and left, at that velocity.
     """
     # With a second one beyond it an edge is left and reached at rest.
     beyond = [edge + (1 if edge > at.max() else -1) for edge in edges]
     knots = np.concatenate([at, edges, beyond]).astype(int)
     points = np.concatenate([values, np.zeros((2 * len(edges), values.shape[1]))])
     knots, first = np.unique(knots, return_index=True)
+    points = points[first]
     if len(knots) == 1:
-        return np.repeat(points[first], frames, axis=0)
-    inside = np.clip(np.arange(frames), knots[0], knots[-1])
-    return np.asarray(PchipInterpolator(knots, points[first])(inside))
+        return np.repeat(points, frames, axis=0)
+    way = PchipInterpolator(knots, points)
+    done = np.asarray(way(np.clip(np.arange(frames), knots[0], knots[-1])))
+    apart = np.diff(knots)
+    for k in range(1, len(knots) - 1):
+        before, after = apart[k - 1], apart[k]
+        if (before == 1) == (after == 1):
+            continue
+        # From the frames that are held to one side, over some on the other.
+        side, room, other = (-1, before, points[k + 1]) if after == 1 else (1, after, points[k - 1])
+        over = min(float(room), max(LEAD * fps, 2.0))
+        steps = np.arange(1, int(np.ceil(over)))
+        share = (steps / over)[:, None]
+        # Over and above the slope that is there: a cubic of Hermite.
+        slope = points[k] - other - side * way(knots[k], 1)
+        done[knots[k] + side * steps] += share * (1 - share) ** 2 * over * slope
+    return done
 
 
 def _turned(skeleton: Skeleton, observation: Observation) -> np.ndarray:

@@ -7,8 +7,10 @@ known joint: there the rotations that the clip already has (a classical completi
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish.windows import ramp
@@ -220,46 +222,122 @@ def refine(
     this shares it out. Damping keeps what positions do not tell. `weights` (F, n) says how much each position
     counts; default: all the same.
     """
-    heavy = 1.0 if weights is None else np.repeat(weights, 3, axis=1)[:, None]
-    skeleton, known = clip.skeleton, list(joints)
-    under = _under(skeleton)
-    movable = [j for j in sorted(joints) if under[known, j].any()]
-    carriers = list(_carriers(skeleton, clip.translated, set(joints)))
-    slots = [clip.translated.index(c) for c in carriers]
-    above = under[np.ix_(known, movable)]
-    carried = (under + np.eye(len(skeleton)))[np.ix_(known, carriers)]
-    seen = [observation.rotation[:, movable], observation.translation[:, carriers]]
-    free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
-    rotation, translation = clip.rotation.copy(), clip.translation.copy()
-    frames, turns = len(clip), 3 * len(movable)
-    by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
-    by_shift = np.broadcast_to(by_shift, (frames, *by_shift.shape))
-
-    def to_parent(vectors: np.ndarray, of: list[int], turned: np.ndarray) -> np.ndarray:
-        """Vectors (F, n, 3) of the world in the axes of the parents of n joints."""
-        parents = np.array([skeleton.parents[j] for j in of])
-        inside = rotations.rotate(rotations.conjugate(turned[:, np.maximum(parents, 0)]), vectors)
-        return np.where(parents[:, None] >= 0, inside, vectors)
-
+    freedom = Freedom.of(clip, observation, joints)
     for _ in range(STEPS):
-        turned, placed = clip.with_motion(rotation, translation).kinematics()
-        lever = (placed[:, known, None] - placed[:, None, movable]) * above[..., None]
+        normal, towards, frame = freedom.normal(clip, positions, weights)
+        normal += DAMPING * np.eye(normal.shape[2])
+        clip = freedom.moved(clip, np.linalg.solve(normal, towards)[..., 0] * freedom.free, frame)
+    return clip
+
+
+def refine_steadily(
+    clip: Clip,
+    observation: Observation,
+    joints: tuple[int, ...],
+    positions: np.ndarray,
+    weights: np.ndarray,
+    done: np.ndarray,
+    steady: float,
+) -> tuple[Clip, np.ndarray]:
+    """As `refine`, of all frames together: what is done to the motion changes evenly over time.
+
+    Args:
+        clip, observation, joints, positions, weights: as in `refine`.
+        done: (F, d) what has been done to the motion already, as it came from here; zeros (F, 1) at first.
+        steady: how much the second differences of what is done count, squared, against metres squared.
+
+    Returns:
+        The clip, and what has been done to it by now.
+    """
+    freedom = Freedom.of(clip, observation, joints)
+    frames, size = freedom.free.shape
+    bend = np.diff(np.eye(frames), 2, axis=0) if frames > 2 else np.zeros((0, frames))
+    even = steady * bend.T @ bend  # (F, F), of which nothing is further than two off the diagonal
+    for _ in range(STEPS):
+        normal, towards, frame = freedom.normal(clip, positions, weights)
+        bands = np.zeros((2 * size + 1, frames * size))
+        for row in range(size):
+            for column in range(row + 1):
+                bands[row - column, column::size] = normal[:, row, column]
+        bands[0] += DAMPING
+        for apart in range(min(3, frames)):
+            weight = np.diagonal(even, apart)[:, None] * freedom.free[apart:] * freedom.free[: frames - apart]
+            bands[apart * size, : (frames - apart) * size] += weight.ravel()
+        towards = towards[..., 0] - even @ done * freedom.free
+        step = solveh_banded(bands, towards.ravel(), lower=True).reshape(frames, size) * freedom.free
+        clip, done = freedom.moved(clip, step, frame), done + step
+    return clip, done
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """How a body may move towards positions of some joints: by turning joints, and shifting what carries it.
+
+    Attributes:
+        known: the n joints.
+        movable, carriers: the joints that may turn, and those that may shift.
+        free: (F, d) 1 where they may, three columns for each.
+    """
+
+    known: list[int]
+    movable: list[int]
+    carriers: list[int]
+    free: np.ndarray
+    above: np.ndarray
+    by_shift: np.ndarray
+
+    @classmethod
+    def of(cls, clip: Clip, observation: Observation, joints: tuple[int, ...]) -> Freedom:
+        """Of what is not observed."""
+        skeleton, known = clip.skeleton, list(joints)
+        under = _under(skeleton)
+        movable = [j for j in sorted(joints) if under[known, j].any()]
+        carriers = list(_carriers(skeleton, clip.translated, set(joints)))
+        seen = [observation.rotation[:, movable], observation.translation[:, carriers]]
+        free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
+        carried = (under + np.eye(len(skeleton)))[np.ix_(known, carriers)]
+        by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
+        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift)
+
+    def normal(
+        self, clip: Clip, positions: np.ndarray, weights: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The normal equations (F, d, d) and (F, d, 1) of a step, and the global rotations of the clip."""
+        turned, placed = clip.kinematics()
+        frames = len(clip)
+        lever = (placed[:, self.known, None] - placed[:, None, self.movable]) * self.above[..., None]
         x, y, z, o = lever[..., 0], lever[..., 1], lever[..., 2], np.zeros_like(lever[..., 0])
         # A small turn d about the axes of the world moves a point by d x lever: rows of that matrix.
         by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], 2)
-        by_turn = by_turn.reshape(frames, 3 * len(known), turns)
-        jacobian = np.concatenate([by_turn, by_shift], axis=2) * free[:, None]
-        miss = (positions - placed[:, known]).reshape(frames, -1, 1)
+        by_turn = by_turn.reshape(frames, 3 * len(self.known), 3 * len(self.movable))
+        by_shift = np.broadcast_to(self.by_shift, (frames, *self.by_shift.shape))
+        jacobian = np.concatenate([by_turn, by_shift], axis=2) * self.free[:, None]
+        miss = (positions - placed[:, self.known]).reshape(frames, -1, 1)
+        heavy = 1.0 if weights is None else np.repeat(weights, 3, axis=1)[:, None]
         transposed = np.swapaxes(jacobian, 1, 2) * heavy
-        normal = transposed @ jacobian + DAMPING * np.eye(jacobian.shape[2])
-        step = np.linalg.solve(normal, transposed @ miss)[..., 0] * free
+        return transposed @ jacobian, transposed @ miss, turned
+
+    def moved(self, clip: Clip, step: np.ndarray, turned: np.ndarray) -> Clip:
+        """The clip a step (F, d) further; `turned` are its global rotations."""
+        skeleton, frames = clip.skeleton, len(clip)
+        slots = [clip.translated.index(c) for c in self.carriers]
+
+        def to_parent(vectors: np.ndarray, of: list[int]) -> np.ndarray:
+            """Vectors (F, n, 3) of the world in the axes of the parents of n joints."""
+            parents = np.array([skeleton.parents[j] for j in of])
+            inside = rotations.rotate(rotations.conjugate(turned[:, np.maximum(parents, 0)]), vectors)
+            return np.where(parents[:, None] >= 0, inside, vectors)
+
+        turns = 3 * len(self.movable)
+        rotation, translation = clip.rotation.copy(), clip.translation.copy()
         # A turn in the world's axes before a joint's own rotation is one in its parent's axes.
-        turn = to_parent(step[:, :turns].reshape(frames, -1, 3), movable, turned)
-        done = rotations.normalize(rotations.multiply(rotations.exp(turn), rotation[:, movable]))
-        rotation[:, movable] = np.where(seen[0][..., None], rotation[:, movable], done)
-        shift = to_parent(step[:, turns:].reshape(frames, -1, 3), carriers, turned)
-        translation[:, slots] += shift / skeleton.scale_above[carriers][:, None]
-    return clip.with_motion(rotation, translation)
+        turn = to_parent(step[:, :turns].reshape(frames, -1, 3), self.movable)
+        done = rotations.normalize(rotations.multiply(rotations.exp(turn), rotation[:, self.movable]))
+        free = self.free[:, :turns:3, None] > 0
+        rotation[:, self.movable] = np.where(free, done, rotation[:, self.movable])
+        shift = to_parent(step[:, turns:].reshape(frames, -1, 3), self.carriers)
+        translation[:, slots] += shift / skeleton.scale_above[self.carriers][:, None]
+        return clip.with_motion(rotation, translation)
 
 
 def _under(skeleton: Skeleton) -> np.ndarray:
