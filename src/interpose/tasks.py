@@ -29,7 +29,7 @@ from interpose.methods import auto, registry
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
-from interpose.observation.broken import broken
+from interpose.observation.broken import broken, roughness
 from interpose.observation.part import lay
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons import find_humanoid
@@ -43,6 +43,8 @@ OVERLAP = 1.0  # ... which overlap by this much and are blended there
 # on either side with which that is tried; metres that feet have to travel in it; and the slide (cm/s) that
 # counts as much as gliding all along.
 TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
+# A moment is mended by the shortest way where velocities jump by less than this share of what they do else.
+CALMER = 0.7
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
 HOTTEST = 10.0  # times the noise of the training that may be injected
@@ -189,12 +191,23 @@ def _momentary(clip: Clip, observation: Observation) -> Observation | None:
 
 
 def _mended(clip: Clip, observation: Observation, lost: Observation) -> tuple[Clip, Observation]:
-    """The clip with what was lost for moments interpolated, and an observation to which that is known."""
-    said, columns = Spline().complete(wipe(clip, observation), observation).clip, list(clip.translated)
-    mended = clip.with_motion(
-        np.where(lost.rotation[..., None], said.rotation, clip.rotation),
-        np.where(lost.translation[:, columns, None], said.translation, clip.translation),
-    )
+    """The clip with what was lost for moments interpolated, and an observation to which that is known.
+
+    By a spline, or where what it goes by is no velocity but another spike, by the shortest way.
+    """
+    hidden, columns = wipe(clip, observation), list(clip.translated)
+
+    def laid(said: Clip) -> Clip:
+        return clip.with_motion(
+            np.where(lost.rotation[..., None], said.rotation, clip.rotation),
+            np.where(lost.translation[:, columns, None], said.translation, clip.translation),
+        )
+
+    mended, straight = laid(Spline().complete(hidden, observation).clip), laid(hidden)
+    for start, stop, (curved, short) in roughness(lost.rotation | lost.translation, mended, straight):
+        if short.max() < CALMER * curved.max():
+            mended.rotation[start:stop] = straight.rotation[start:stop]
+            mended.translation[start:stop] = straight.translation[start:stop]
     known = replace(
         observation,
         rotation=observation.rotation | lost.rotation,

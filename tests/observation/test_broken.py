@@ -8,7 +8,8 @@ from tests.skeletons.rigs import under_root
 
 from interpose import formats
 from interpose.geometry import rotations
-from interpose.observation.broken import broken
+from interpose.observation import Observation
+from interpose.observation.broken import _smoother, broken
 from interpose.skeletons.carrier import hips_of
 
 
@@ -146,3 +147,22 @@ def test_nothing_is_broken_in_real_clips(data, name):
 @pytest.mark.parametrize("frames", range(6))
 def test_short_clips(cmu_walk, frames):
     assert broken(cmu_walk.slice(50, 50 + frames)).complete
+
+
+def test_what_would_throw_a_foot_about_is_not_lost(cmu_walk):
+    """A knee that spins while the ankle spins back, as some solvers write them: the foot goes on smoothly."""
+    skeleton = cmu_walk.skeleton
+    knee, ankle = (skeleton.index(name) for name in ("LeftLeg", "LeftFoot"))
+    shin = skeleton.rest_translation[ankle] / np.linalg.norm(skeleton.rest_translation[ankle])
+    rotation = cmu_walk.rotation.copy()
+    turn = rotations.exp(np.where(np.arange(len(rotation)) % 2, 2.0, -1.0)[:, None] * shin)
+    rotation[:, knee] = rotations.multiply(rotation[:, knee], turn)
+    rotation[:, ankle] = rotations.multiply(rotations.conjugate(turn), rotation[:, ankle])
+    spun = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    np.testing.assert_allclose(spun.positions(), cmu_walk.positions(), atol=1e-9)
+    spiked = cmu_walk.rotation.copy()
+    spiked[60, ankle] = rotations.multiply(spiked[60, ankle], rotations.about("X", np.array(2.0)))
+    for clip, real in ((spun, False), (cmu_walk.with_motion(spiked, cmu_walk.translation), True)):
+        alone = Observation.full(clip)
+        alone.rotation[60, ankle] = False
+        assert _smoother(clip, alone).rotation[60, ankle] != real
