@@ -62,3 +62,38 @@ def test_a_folder_without_clips_is_said(run, takes):
     done = run("recover", "takes/empty")
     assert done.code == 3
     assert "no motion file in it" in done.err
+
+
+def test_results_go_into_a_folder_and_folders_within_folders_are_looked_into(run, takes):
+    (takes / "day").mkdir()
+    (takes / "c.bvh").rename(takes / "day" / "c.bvh")
+    shutil.copy(takes / "b.bvh", takes / "day" / "d.bvh")
+    done = run("scan", "takes", "--json")
+    names = ["takes/a.bvh", "takes/b.bvh", "takes/day/c.bvh", "takes/day/d.bvh"]
+    assert [one["input"] for one in done.json] == names
+    (takes.parent / "done").mkdir()
+    assert run("fill", "takes", "--method", "spline", "-o", "done").code == 3
+    made = sorted(path.name for path in (takes.parent / "done").iterdir())
+    assert made == ["b.bvh", "b.json", "d.bvh", "d.json"]
+    assert not [*takes.rglob("*.filled.*")]
+
+
+def test_an_empty_folder_keeps_nobody_from_the_others(run, takes):
+    (takes / "c.bvh").unlink()
+    (takes.parent / "empty").mkdir()
+    done = run("fill", "empty", "takes/b.bvh", "--method", "spline")
+    assert done.code == 3
+    assert "no motion file in it" in done.err
+    assert (takes / "b.filled.bvh").exists()
+
+
+def test_what_another_verb_restores_is_said_of_each_clip(run, takes):
+    """Hips that stand still are no gap: `fill` leaves them, and says so by its exit code, too."""
+    clip = load(takes / "a.bvh")
+    translation = clip.translation.copy()
+    translation[60:100] = translation[59]
+    save(clip.with_motion(clip.rotation, translation), takes / "a.bvh", force=True)
+    (takes / "c.bvh").unlink()
+    done = run("fill", "takes", "--method", "spline", "--json")
+    assert done.code == 4
+    assert "hips that stand still, which `interpose recover` restores" in done.json[0]["left"]

@@ -124,7 +124,8 @@ def test_standing_still_within_the_noise_of_capture_is_no_finding():
     )
     quiet = clip.rotation.copy()
     quiet[60:100] = rotation
-    assert scan(clip.with_motion(quiet, clip.translation)) == []
+    found = scan(clip.with_motion(quiet, clip.translation))
+    assert [one.kind for one in found] == ["jump"]  # back to the motion, in frame 100
 
 
 def test_a_hinge_at_its_limit_is_no_finding():
@@ -218,3 +219,31 @@ def test_tiny_and_still_clips(frames):
 def test_a_real_walk_has_no_frozen_body(cmu_walk):
     found = [f for f in scan(cmu_walk) if f.kind not in ("rest pose", "outlier")]
     assert found == []
+
+
+@pytest.mark.parametrize("way", [0.4, 1.5])
+def test_a_body_that_is_elsewhere_from_one_frame_on_is_said_to_jump(cmu_walk, way):
+    clip = cmu_walk.slice(1, 200)
+    translation = clip.translation.copy()
+    translation[90:, 0, 0] += way
+    (found,) = [one for one in scan(clip.with_motion(clip.rotation, translation)) if one.kind != "lost"]
+    assert (found.kind, found.joints, found.start) == ("jump", None, 90)
+    assert "the body is" in found.note
+    assert f"{way * 30:.0f}"[0] in found.note
+    assert to_gaps([found]) == []
+
+
+def test_frames_that_were_cut_out_and_an_arm_that_goes_on_elsewhere_are_said_to_jump(cmu_walk):
+    clip = cmu_walk.slice(1, 200)
+    kept = np.delete(np.arange(len(clip)), np.arange(100, 120))
+    cut = clip.with_motion(clip.rotation[kept], clip.translation[kept])
+    assert [one.start for one in scan(cut) if one.kind == "jump"] == [100]
+    arm, rotation = clip.skeleton.index("LeftArm"), clip.rotation.copy()
+    rotation[80:, arm] = rotations.multiply(rotation[80:, arm], rotations.about("X", np.array(0.9)))
+    (found,) = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "jump"]
+    assert found.start == 80
+    assert found.joints is not None
+    assert {clip.skeleton.index(name) for name in found.joints} <= {
+        joint for joint in range(len(clip.skeleton)) if arm in clip.skeleton.ancestors(joint)
+    }
+    assert not [one for one in scan(clip) if one.kind == "jump"]

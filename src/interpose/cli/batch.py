@@ -28,23 +28,31 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
         if not more and not file.is_dir():
             return verb(file, **options) or 0
         files = [*{path.resolve(): path for path in clips((file, *more))}.values()]
-        if options.get("output") is not None:
-            why = f"{len(files)} files are to be written"
+        if files == [file] and file.is_dir():
+            raise _empty(file)
+        folder: Path | None = options.get("output")
+        if folder is not None and not folder.is_dir():
             raise RequestError(
-                "--output names one file", why, "Leave it out: each lies beside what it was made of."
+                "--output names one file",
+                f"{len(files)} files are to be written",
+                "Name a folder that is there; or leave it out: each lies beside what it was made of.",
             )
         codes, reports = [], []
         for path in files:
             said = StringIO()
+            if folder is not None:
+                options["output"] = folder / path.name
             try:
+                if path.is_dir():
+                    raise _empty(path)
                 with redirect_stdout(said) if options.get("json") else nullcontext():
                     codes.append(verb(path, **options) or 0)
                 reports.append(json.loads(said.getvalue() or "null"))
             except NothingError as error:
-                reports.append({"input": str(path), "nothing": error.what})
-                codes.append(0)
+                reports.append({"input": str(path), "nothing": error.what, "left": error.left})
+                codes.append(error.code)
                 if not options.get("json"):
-                    say(error.what)
+                    say(f"{error.what}, but {error.left}" if error.left else error.what)
             except InterposeError as error:
                 reports.append({"input": str(path), "error": error.what})
                 complain(error)
@@ -65,16 +73,21 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
     return many
 
 
+def _empty(folder: Path) -> FileError:
+    """That there is no clip in a folder."""
+    why = f"there is no motion file in it ({', '.join(MOTION)})"
+    return FileError(f"cannot read {folder}", why, "Name a folder with clips, or a clip.")
+
+
 def clips(paths: Iterable[Path]) -> Iterable[Path]:
-    """Files, and in place of folders the motion files in them, without what verbs have made of these."""
+    """Files, and in place of folders the motion files in them, and in folders in these, without what verbs
+    have made of them. A folder without any stands for itself, to be complained of."""
     for path in paths:
         if not path.is_dir():
             yield path
             continue
-        held = sorted(one for one in path.iterdir() if one.suffix.lower() in MOTION and one.is_file())
+        held = sorted(one for one in path.rglob("*") if one.suffix.lower() in MOTION and one.is_file())
         # take.filled.bvh lies beside the take.bvh that it was made of.
-        found = [one for one in held if one.with_name(one.stem.rpartition(".")[0] + one.suffix) not in held]
-        if not found:
-            why = f"there is no motion file in it ({', '.join(MOTION)})"
-            raise FileError(f"cannot read {path}", why, "Name a folder with clips, or a clip.")
-        yield from found
+        names = {*held}
+        found = [one for one in held if one.with_name(one.stem.rpartition(".")[0] + one.suffix) not in names]
+        yield from found or [path]

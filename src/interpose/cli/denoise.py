@@ -53,7 +53,7 @@ def denoise(
         method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
-        output: where to write the clip; the report goes beside it.
+        output: where to write the clip; the report goes beside it. Of several clips a folder.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
         force: replace existing files, of .json files only reports.

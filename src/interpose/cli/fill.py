@@ -61,7 +61,8 @@ def fill(
       interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
         --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
 
-    Ends with 0 when all is filled, 4 when a gap stays open, 2 or 3 when nothing was done.
+    Ends with 0 when all is filled, 4 when a gap stays open, or when a scan finds what
+    another verb restores, 2 or 3 when nothing was done.
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
@@ -75,7 +76,7 @@ def fill(
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
             to hold it there. May be repeated.
-        output: where to write the filled clip; the report goes beside it.
+        output: where to write the filled clip; the report goes beside it. Of several clips a folder.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         max_gap: leave gaps of more than this many frames open, and list them.
@@ -137,9 +138,11 @@ def fill(
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
     more |= {"path": request.path} if request.path else {}
     more |= {"pinned": request.pins} if request.pins else {}
-    return finish(
+    more |= {"left": request.left} if request.left else {}
+    code = finish(
         "fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force, more=more
     )
+    return code or (4 if request.left else 0)
 
 
 def _why(gap: Gap, max_gap: int | None) -> str:

@@ -58,7 +58,7 @@ def recover(
         place: where the body is, is lost, and how it is turned is known, as of suits that know no places:
             feet that stand tell it. Without --frames it begins where the first frame is.
         frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
-        output: where to write the clip; the report goes beside it.
+        output: where to write the clip; the report goes beside it. Of several clips a folder.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
@@ -97,11 +97,14 @@ def recover(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose, spikes, or jumps away and back within a second",
             f"interpose fill {file} fills what else is missing." if others else fix,
+            f"{len(others)} gaps, which `interpose fill` fills" if others else "",
+            4 if others else 0,
         )
-    code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force)
+    lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others]
+    more = {"left": f"{', '.join(lost)}, which `interpose fill` fills"} if others else {}
+    code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force, more=more)
     if others and not json:
-        lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others[:SHOWN]]
-        more = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
-        say(f"Missing, too, and left as it is: {', '.join(lost)}{more}")
+        rest = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
+        say(f"Missing, too, and left as it is: {', '.join(lost[:SHOWN])}{rest}")
         say(f"interpose fill {quote(str(outputs.clip))} fills it; interpose scan lists all.")
-    return code
+    return code or (4 if others else 0)

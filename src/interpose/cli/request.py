@@ -36,6 +36,7 @@ class Request:
         parts: poses of single joints from other clips, each with the path of its clip.
         path: points of the floor, as they were written.
         pins: places of joints, as they were written.
+        left: what is missing, too, and is another verb's.
     """
 
     gaps: list[Gap]
@@ -49,6 +50,7 @@ class Request:
     parts: list[tuple[Path, Part]] = field(default_factory=list)
     path: list[str] = field(default_factory=list)
     pins: list[str] = field(default_factory=list)
+    left: str = ""
 
 
 def from_options(
@@ -106,20 +108,17 @@ def _scanned(file: Path, clip: Clip) -> Request:
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
     dropped = [one for one in found if one.kind == "lost"]
     stuck = [one for one in found if one.kind == "frozen position"]
+    kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(stuck)
+    left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""
     if not gaps:
-        why = "no --gap is given, and a scan finds nothing missing"
-        if dropped or stuck:
-            kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(
-                stuck
-            )
-            why += f" but {' and '.join(kinds)}, which `interpose recover` restores"
-        raise NothingError(f"nothing to fill in {file}", why, fix)
+        why = "no --gap is given, and a scan finds nothing missing" + (f" but {left}" if left else "")
+        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]
     lines += [f"  {one.start}:{one.stop} {one.kind}, {one.note}" for one in found if one.kind not in NO_GAPS]
     lines += [f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in stuck]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
-    return Request(gaps, said="\n".join(lines))
+    return Request(gaps, said="\n".join(lines), left=left if stuck else "")
 
 
 def part_of(

@@ -9,6 +9,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import names, say, say_json, say_table, seconds
 from interpose.cli.reading import Reading, describe, details
 
+EASED = 0.3  # seconds on either side of a jump that a fill may lead over
 SHOWN = 10  # dropouts, of many
 
 
@@ -64,5 +65,10 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
-    if len(to_gaps(found)) + len(dropped) < len(found) and legs(clip.skeleton):
+    jumps = [one for one in found if one.kind == "jump"]
+    if jumps:
+        first, room = jumps[0].start, max(2, round(EASED * clip.fps))
+        gap = f"{max(first - room, 1)}:{min(first + room, len(clip) - 1)}"
+        say(f"interpose fill {quote(str(file))} --gap {gap} leads over the first jump.")
+    if any(one.kind == "frozen position" for one in found) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
@@ -14,7 +15,7 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.observation import Gap, Observation
 from interpose.skeletons import SIDES, find_mapping
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import hips_of, placed
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
 # trembles by 1e-4 and more; files keep about 1e-8.
@@ -40,8 +41,11 @@ OUTLIER = 0.05
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 # Metres a second from which no body comes to stand, to the last digit, from one frame to the next.
 PACE = 0.3
+# A joint, against the hips, or the hips themselves go further than this (metres) from one frame to the next,
+# and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
+TELEPORTS, TIMES = 0.1, 5.0
 # Kinds of findings that are no gaps.
-NO_GAPS = ("frozen position", "lost")
+NO_GAPS = ("frozen position", "lost", "jump")
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,7 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose", "outlier" or "lost".
+        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost" or "jump".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -82,6 +86,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
+    - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
+      there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
     those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
@@ -101,6 +107,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
         findings += _lost(clip, findings)
+        findings += _jumps(clip, known, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
@@ -275,6 +282,36 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
         for run in runs(column):
             together.setdefault(run, []).append(name)
     return [Finding("lost", tuple(names), *run, "jumps away and back") for run, names in together.items()]
+
+
+def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
+    """Where the body, or joints of it, are elsewhere from one frame to the next; not beside what has been
+    found already, which begins and ends so."""
+    positions, hips = clip.positions(), hips_of(clip.skeleton)
+    around = positions - positions[:, [hips]]
+    around[:, hips] = positions[:, hips]
+    seen = known.positions(clip.skeleton)
+    steps = np.linalg.norm(np.diff(around, axis=0), axis=-1)
+    steps[~(seen[1:] & seen[:-1])] = 0.0
+    beside = ndimage.maximum_filter(steps, footprint=[[1]] * 3 + [[0]] + [[1]] * 3, mode="nearest")
+    jumps = (steps > TELEPORTS) & (steps > TIMES * beside)
+    for one in findings:
+        jumps[max(one.start - 2, 0) : one.stop + 1] = False
+    found = []
+    for step in np.flatnonzero(jumps.any(axis=1)).tolist():
+        joint = int(steps[step].argmax())
+        way = float(steps[step, hips] if jumps[step, hips] else steps[step, joint])
+        speed = f"{way:.2f} m further from one frame to the next, {way * clip.fps:.0f} m/s"
+        what = "the body is" if jumps[step, hips] else f"{clip.skeleton.names[joint]} is"
+        joints = None if jumps[step, hips] else _topmost(clip, np.flatnonzero(jumps[step]).tolist())
+        found.append(Finding("jump", joints, step + 1, step + 2, f"{what} {speed}"))
+    return found
+
+
+def _topmost(clip: Clip, joints: list[int]) -> tuple[str, ...]:
+    """The names of joints that hang from none of the others."""
+    above = [{*clip.skeleton.ancestors(joint)} & {*joints} for joint in joints]
+    return tuple(clip.skeleton.names[joint] for joint, some in zip(joints, above) if not some)
 
 
 def _lively(paused: np.ndarray, still: np.ndarray) -> bool:

@@ -115,7 +115,8 @@ def parse_header(start: bytes, name: str) -> Header:
         raise FileError(
             what,
             f"line {line}: a frame takes {seconds:g} seconds",
-            f'Was it meant in milliseconds? Then write "Frame Time: {seconds / 1000:g}".',
+            f'Were frames a second meant? Then write "Frame Time: {1 / seconds:.7g}". Or milliseconds? Then '
+            f'"Frame Time: {seconds / 1000:g}".',
         )
     if int(frames[1]) == 0:
         raise FileError(what, "its motion has no frames (Frames: 0)", "Export the clip with its motion.")
