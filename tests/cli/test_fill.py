@@ -267,6 +267,9 @@ def test_the_place_of_a_body_is_recovered_by_name_and_where_it_stands_still(run,
     assert np.linalg.norm(load(Path("stuck.recovered.bvh")).root - clip.root, axis=1).max() < 0.1
     named = run("recover", "stuck.bvh", "--place", "--frames", "60:120", "-o", "named.bvh")
     assert named.code == 0
+    again = run("fill", "stuck.bvh", "--gaps", "stuck.recovered.json", "-o", "again.bvh")
+    assert again.code == 2
+    assert "Run interpose recover again" in again.err
     assert np.abs(load(Path("named.bvh")).root - load(Path("stuck.recovered.bvh")).root).max() < 1e-4
     assert run("recover", "stuck.bvh", "--place", "--joints", "LeftArm").code == 2
     suit = clip.slice(0, 9)

@@ -68,6 +68,7 @@ def recover(
     """
     from interpose import tasks
     from interpose.cli.request import check_method, range_of
+    from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
     from interpose.observation.scan import NO_GAPS, scan
     from interpose.skeletons.carrier import STILL
@@ -102,6 +103,8 @@ def recover(
         )
     lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others]
     more = {"left": f"{', '.join(lost)}, which `interpose fill` fills"} if others else {}
+    if stood := [f"{one.start}:{one.stop}" for one in done.report.gaps if STOOD in one.notes]:
+        more["place"] = ", ".join(stood)
     code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force, more=more)
     if others and not json:
         rest = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""

@@ -77,6 +77,9 @@ def from_options(
         if is_report(content) and (verb := content.get("verb")) in OTHERS:
             why = f"{gaps} is of {verb}, which makes what is no gap of the clip that it was given"
             raise RequestError("this report cannot be repeated", why, f"Run interpose {verb} again.")
+        if is_report(content) and (content.get("place") or content.get("moments")):
+            why = f"{gaps} is of recover, which restored what is no gap: where the body is, or moments"
+            raise RequestError("this report cannot be repeated", why, "Run interpose recover again.")
         filled = read_gaps(gaps)
         if is_report(content) and listed:
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"

@@ -29,6 +29,7 @@ from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Pin
 from interpose.skeletons.carrier import rooted
 
+STOOD = "what the body stands on tells where it is"
 # Positions further out than this (metres) are as good as no numbers.
 NOWHERE = 1e4
 # A share of all joints: so many laid on a body are most of it.
@@ -116,7 +117,7 @@ def complete(
         lost = alone(known, hidden)
         for span in spans:
             if lost[span.start : span.stop].any():
-                span.notes.append((span.start, span.stop - 1, "what the body stands on tells where it is"))
+                span.notes.append((span.start, span.stop - 1, STOOD))
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
