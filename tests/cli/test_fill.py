@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -478,3 +479,35 @@ def test_a_path_in_a_file_with_z_up(run, take):
     clip = load(take, up="z")
     (point,) = path_of(["75:3,4"], clip).values()
     assert np.allclose(point, np.array([3.0, -4.0]) * clip.source.unit), "x and y of the file"
+
+
+def test_joints_of_another_clip_are_laid_over_the_motion_that_is_there(run, take, data):
+    shutil.copy(data / "cmu_jump.bvh", "jump.bvh")
+    part = ["--from", "jump.bvh", "--from-range", "20:50", "--at", "70", "--joints", "RightArm,RightForeArm"]
+    assert "--layer" in run("fill", "take.bvh", *part).err
+    assert run("fill", "take.bvh", *part, "--layer", "--method", "spline").code == 0
+    before, after, jump = (load(Path(name)) for name in ("take.bvh", "take.filled.bvh", "jump.bvh"))
+    arm = [before.skeleton.index(name) for name in ("RightArm", "RightForeArm")]
+    np.testing.assert_allclose(after.rotation[70:100, arm], jump.rotation[20:50, arm], atol=1e-6)
+    rest = [joint for joint in range(len(before.skeleton)) if joint not in arm]
+    assert np.array_equal(after.rotation[:, rest], before.rotation[:, rest])
+    assert np.array_equal(after.translation, before.translation)
+    again = run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh")
+    assert again.code == 0
+    assert Path("again.bvh").read_bytes() == Path("take.filled.bvh").read_bytes()
+    assert "no other clip is named" in run("fill", "take.bvh", "--layer").err
+
+
+def test_times_in_seconds_and_where_joints_are(run, take):
+    """What `skeleton --at` prints is what --pin takes: the hand pinned where it is stays there."""
+    where = run("skeleton", "take.bvh", "--at", "3s", "--json").json
+    assert where["frame"] == 90
+    place = ",".join(map(str, where["positions"]["LeftHand"]))
+    assert place in run("skeleton", "take.bvh", "--at", "90", "--json").out.replace(" ", "").replace("\n", "")
+    done = run("fill", "take.bvh", "--gap", "80:100", "--pin", f"LeftHand@3s:{place}", "--json")
+    assert done.json["gaps"][0]["pins"] < 0.1
+    hand = load(take).skeleton.index("LeftHand")
+    off = load(Path("take.filled.bvh")).positions()[90, hand] - load(take).positions()[90, hand]
+    assert np.abs(off).max() < 0.002
+    assert run("fill", "take.bvh", "--gap", "80:100", "--pin", f"LeftHand@99s:{place}").code == 2
+    assert "there is no frame" in run("skeleton", "take.bvh", "--at", "99s").err

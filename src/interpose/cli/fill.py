@@ -31,6 +31,7 @@ def fill(
     from_: Annotated[Path | None, Parameter(name="--from")] = None,
     from_range: str | None = None,
     at: int | None = None,
+    layer: bool = False,
     path: list[str] = [],  # noqa: B006
     pin: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
@@ -60,6 +61,8 @@ def fill(
       interpose fill take.bvh --gap 120:160 --pin LeftHand@140:35,142,-20
       interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
         --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
+      interpose fill take.bvh --layer --from wave.bvh --at 130
+        --joints RightArm,RightHand   (another clip's arm over the motion that is there)
 
     Ends with 0 when all is filled, 4 when a gap stays open, or when a scan finds what
     another verb restores, 2 or 3 when nothing was done.
@@ -73,6 +76,8 @@ def fill(
         from_: another clip of the same character that gives poses of the --joints inside of a gap.
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
+        layer: the --joints alone are another clip's, and eased in and out; all else stays as it is, where
+            otherwise the whole pose of a --gap is filled around them.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
             to hold it there. May be repeated.
@@ -91,6 +96,7 @@ def fill(
     from interpose.cli.request import (
         check_method,
         from_options,
+        layered,
         part_of,
         parts_to_dict,
         path_of,
@@ -101,7 +107,15 @@ def fill(
 
     clip = reading_of(gaps, reading).load(file, roles_of(gaps))
     parts = part_of(from_, from_range, at, joints, reading)
-    request = from_options(file, clip, gap, [] if parts else joints, gaps, reading)
+    if layer and not gap:
+        gap = layered(parts, clip)
+    if parts and not gap and gaps is None:
+        raise RequestError(
+            f"no gap of {file.name} is named for --from",
+            "the joints of another clip are laid into a gap",
+            "Write --gap 120:150; or --layer, to lay them over the motion that is there.",
+        )
+    request = from_options(file, clip, gap, [] if parts and not layer else joints, gaps, reading)
     request = replace(request, parts=request.parts + parts, path=request.path + path, pins=request.pins + pin)
     points, pins = path_of(request.path, clip), pins_of(request.pins, clip)
     check_method(method or "auto", license)
@@ -136,6 +150,7 @@ def fill(
         )
     why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
+    more |= {"layer": True} if layer or request.layer else {}
     more |= {"path": request.path} if request.path else {}
     more |= {"pinned": request.pins} if request.pins else {}
     more |= {"left": request.left} if request.left else {}

@@ -18,6 +18,7 @@ from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.scan import NO_GAPS, scan, to_gaps
 
+EASED = 0.4  # seconds over which joints of another clip are eased in and out
 OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
 
 
@@ -37,6 +38,7 @@ class Request:
         path: points of the floor, as they were written.
         pins: places of joints, as they were written.
         left: what is missing, too, and is another verb's.
+        layer: whether the parts are laid over motion that stays.
     """
 
     gaps: list[Gap]
@@ -51,6 +53,7 @@ class Request:
     path: list[str] = field(default_factory=list)
     pins: list[str] = field(default_factory=list)
     left: str = ""
+    layer: bool = False
 
 
 def from_options(
@@ -144,6 +147,16 @@ def part_of(
     return [(path, Part(clip, whole.start, whole.stop, at, names))]
 
 
+def layered(parts: list[tuple[Path, Part]], clip: Clip) -> list[str]:
+    """The gap in which --layer lays the part: with what it takes to ease it in and out."""
+    if not parts:
+        why = "--layer lays joints of another clip over the motion"
+        raise RequestError("no other clip is named", why, "Name it with --from FILE.")
+    (_, part), over = parts[0], max(2, round(EASED * clip.fps))
+    stop = part.at + part.stop - part.start + over
+    return [f"{max(part.at - over, 0)}:{min(stop, len(clip))}"]
+
+
 def _frames(text: str) -> Gap:
     try:
         return Gap.parse(text)
@@ -163,13 +176,28 @@ def range_of(text: str, clip: Clip, joints: tuple[str, ...] | None = None) -> Ga
         raise RequestError(f"cannot read --frames {text}", error.why.replace("a gap", "it"), fix) from None
 
 
+FRAME = r"\d+|\d*\.?\d+s"  # a frame, or a time in seconds
+
+
+def frame_of(text: str, clip: Clip) -> int:
+    """A frame from "140", or the one nearest to "3.5s". RequestError for what is none, or is not there."""
+    if not re.fullmatch(FRAME, text):
+        why = "it is a number of a frame, counted from 0, or a time in seconds"
+        raise RequestError(f"cannot read the frame {text}", why, "Write 140, or 3.5s.")
+    frame = round(float(text[:-1]) * clip.fps) if text.endswith("s") else int(text)
+    if frame >= len(clip):
+        why = f"the clip has {len(clip)} frames, counted from 0"
+        raise RequestError(f"there is no frame {text}", why, f"Choose one of 0 to {len(clip) - 1}.")
+    return frame
+
+
 def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
     """Points "FRAME:A,B" of --path, in the file's own unit and floor axes: x and z in metres by frame."""
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
     floor = ["xyz".index(axis) for axis in "xyz" if axis != up[-1]]
     points = {}
     for text in texts:
-        match = re.fullmatch(r"(\d+):([^,]+),([^,]+)", text)
+        match = re.fullmatch(rf"({FRAME}):([^,]+),([^,]+)", text)
         try:
             where = np.zeros(3)
             where[floor] = [float(number) for number in match.groups()[1:]] if match else np.nan
@@ -182,8 +210,13 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
                 f"a point is a frame and two coordinates on the floor, {names}, in the file's own unit",
                 "Write for example --path 130:120.5,-40.",
             )
-        points[int(match[1])] = vectors_inside(where, unit, up)[[0, 2]]
+        points[frame_of(match[1], clip)] = vectors_inside(where, unit, up)[[0, 2]]
     return points
+
+
+def _until(text: str, clip: Clip) -> int:
+    """The frame that a range ends before, which may be the one after the last."""
+    return len(clip) if text == str(len(clip)) else frame_of(text, clip)
 
 
 def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
@@ -191,13 +224,13 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
     found = []
     for text in texts:
-        match = re.fullmatch(r"(.+)@(\d+)(?::(\d+))?:([^:,]+),([^:,]+),([^:,]+)", text)
+        match = re.fullmatch(rf"(.+)@({FRAME})(?::({FRAME}))?:([^:,]+),([^:,]+),([^:,]+)", text)
         try:
             where = np.array([float(number) for number in match.groups()[3:]] if match else [np.nan])
         except ValueError:
             where = np.array([np.nan])
-        start = int(match[2]) if match else 0
-        stop = int(match[3]) if match and match[3] else start + 1
+        start = frame_of(match[2], clip) if match else 0
+        stop = _until(match[3], clip) if match and match[3] else start + 1
         if match is None or not np.isfinite(where).all() or stop <= start:
             raise RequestError(
                 f"cannot read --pin {text}",
@@ -205,7 +238,7 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
                 "Write for example --pin LeftHand@130:35,142,-20, or LeftHand@130:140:35,142,-20 to hold it.",
             )
         clip.skeleton.index(match[1])
-        frames = np.arange(start, min(stop, len(clip) + start + 1))  # `check` says what is outside
+        frames = np.arange(start, stop)
         found.append(Pin(match[1], frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
     return found
 
@@ -232,9 +265,12 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Rea
         for one in content.get("parts", [])
         for part in part_of(Path(one["file"]), one["frames"], one["at"], one["joints"], reading)
     ]
-    # The report of a gap with parts lists their frames by themselves, without the joints that they gave.
-    holed = [gap for gap in filled if any(gap.start <= part.at < gap.stop for _, part in parts)]
-    filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
+    if content.get("layer"):
+        filled += [Gap(p.at, p.at + p.stop - p.start, p.joints) for _, p in parts]
+    else:
+        # The report of a gap with parts lists their frames by themselves, without the joints that they gave.
+        holed = [gap for gap in filled if any(gap.start <= part.at < gap.stop for _, part in parts)]
+        filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
     return Request(
         [*filled, *open_gaps],
         content["method"],
@@ -248,6 +284,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Rea
         parts,
         list(content.get("path", [])),
         list(content.get("pinned", [])),
+        layer=bool(content.get("layer")),
     )
 
 

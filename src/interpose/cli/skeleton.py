@@ -28,6 +28,7 @@ def skeleton(
     save_map: Path | None = None,
     picture: Path | None = None,
     rest_frame: int | None = None,
+    at: str | None = None,
     json: bool = False,
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
@@ -38,6 +39,7 @@ def skeleton(
       interpose skeleton take.bvh
       interpose skeleton take.bvh --picture take.svg
       interpose skeleton take.bvh --save-map take.map.json
+      interpose skeleton take.bvh --at 140   (where its joints are, to pin them)
 
     A saved map can be corrected by hand and given to any verb with --map.
 
@@ -48,10 +50,13 @@ def skeleton(
         save_map: write the mapping to a .json file, to be corrected and given to --map.
         picture: draw the skeleton's zero pose and the T-pose that was found for it, as .svg.
         rest_frame: look at the T-pose that a frame would give in which the body stands in a rest pose.
+        at: a frame, counted from 0, or a time, 3.5s: print where joints are in it, in the file's unit and
+            axes, as `fill --pin` and `--path` take them.
         json: print JSON for other programs.
         force: replace an earlier map or picture.
     """
     from interpose.cli.outputs import write_text
+    from interpose.cli.request import frame_of
     from interpose.skeletons import find_humanoid
     from interpose.skeletons.mapfile import map_text
 
@@ -66,10 +71,12 @@ def skeleton(
             "Map it first: --save-map, then --map.",
         )
     drawn = _picture(body) if picture is not None else ""
+    frame = None if at is None else frame_of(at, clip)
     if json:
-        say_json({"input": str(file), **details(clip), **_details(body)})
+        where = {} if frame is None else {"frame": frame, "positions": _places(clip, frame)}
+        say_json({"input": str(file), **details(clip), **_details(body), **where})
     else:
-        _print(file, clip, body)
+        _print(file, clip, body, frame)
     for path, text in ((save_map, map_text(mapping)), (picture, drawn)):
         if path is not None:
             write_text(path, text)
@@ -122,7 +129,16 @@ def _details(body: Humanoid) -> dict[str, Any]:
     }
 
 
-def _print(file: Path, clip: Clip, body: Humanoid) -> None:
+def _places(clip: Clip, frame: int) -> dict[str, list[float]]:
+    """Where joints are in a frame, by name, in the file's unit and axes."""
+    from interpose.formats.place import vectors_in_file
+
+    unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
+    placed = vectors_in_file(clip.slice(frame, frame + 1).positions()[0], unit, up)
+    return {name: [round(float(x), 4) for x in row] for name, row in zip(clip.skeleton.names, placed)}
+
+
+def _print(file: Path, clip: Clip, body: Humanoid, frame: int | None) -> None:
     from interpose.skeletons import JOINTS
 
     mapping = body.mapping
@@ -145,7 +161,12 @@ def _print(file: Path, clip: Clip, body: Humanoid) -> None:
         follows = "above it" if hips is not None and joint in skeleton.ancestors(hips) else follows
         rows.append(("  " * depth[joint] + skeleton.names[joint], name, HOW.get(how, follows)))
     say()
-    say_table(("joint", "is", ""), rows)
+    if frame is None:
+        say_table(("joint", "is", ""), rows)
+    else:
+        where = _places(clip, frame)
+        said = [",".join(f"{x:.4g}" for x in where[name]) for name in skeleton.names]
+        say_table(("joint", "is", "", f"at frame {frame}"), [(*row, one) for row, one in zip(rows, said)])
     if mapping.missing and mapping.usable:
         say()
         say(f"missing, so derived from the others: {', '.join(mapping.missing)}")

@@ -120,7 +120,7 @@ def stitch(
 def _read(text: str, reading: Reading) -> Piece:
     """FILE or FILE#START:STOP."""
     name, _, part = text.rpartition("#")
-    if not name or ":" not in part:
+    if not name or Path(text).exists():
         whole = reading.load(Path(text))
         return Piece(Path(text), None, whole, whole)
     whole = reading.load(Path(name))
