@@ -70,11 +70,26 @@ def test_who_is_above_the_floor_is_not_touched(lying, cmu_walk):
         assert floor.lifted(clip, seen, (GAP.start, GAP.stop)) is clip
 
 
-def test_feet_of_who_stands_have_other_rules(cmu_walk):
+def test_feet_of_who_stands_tell_the_floor_where_enough_is_known(cmu_walk):
+    """Two keys may both be in the air."""
     seen, low = Observation.from_gaps(cmu_walk, [GAP]), sunk(cmu_walk)
-    deep, joints = floor.depth(low, seen)
-    ends = [joints.index(joint) for joint in feet.ends(cmu_walk.skeleton)]
-    assert deep[:, ends].max() <= 0
+    keys = Observation.from_gaps(cmu_walk, [Gap(0, GAP.start - 1), GAP, Gap(GAP.stop + 1, len(cmu_walk))])
+    deepest = []
+    for known in (seen, keys):
+        deep, joints = floor.depth(low, known)
+        ends = [joints.index(joint) for joint in feet.ends(cmu_walk.skeleton)]
+        deepest.append(deep[GAP.start : GAP.stop, ends].max())
+    assert deepest[0] > 0.08
+    assert deepest[1] <= 0
+
+
+def test_toes_go_no_lower_than_toes_are_known_to(lying):
+    """Though another joint lies 8 cm deeper: knees on which a body kneels may be under the floor."""
+    toe = lying.skeleton.index("RightToeBase")
+    heights = lying.positions()[0, :, 1]
+    assert heights[toe] - heights.min() == pytest.approx(0.08, abs=0.01)
+    deep, joints = floor.depth(sunk(lying, 0.3), Observation.from_gaps(lying, [GAP]))
+    assert deep[:, joints.index(toe)].max() == pytest.approx(0.3, abs=1e-3)
 
 
 def test_where_the_floor_is_and_which_way_a_body_faces_makes_no_difference(lying):

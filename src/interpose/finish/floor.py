@@ -1,6 +1,6 @@
 """Nobody goes through the floor: what is lower than all that is known nearby is lifted, the body with it.
 
-The feet of who stands have rules of their own (`finish/feet.py`); here it is about who lies, crawls or falls.
+How feet stand is a matter of `finish/feet.py`; here it is about who lies, crawls or falls, and what is left.
 The floor is the lowest joint that is observed nearby, as nothing else tells where it is.
 """
 
@@ -25,25 +25,35 @@ BLEND = 0.15
 # How much the place of every other joint counts beside those that are lifted, round by round; and how many
 # times more those of feet do.
 SHARES, FEET = (1e-1, 1e-2), 10.0
-# Metres above the floor below which hips are those of a body that does not stand: its feet are lifted, too.
-LOW = 0.5
+# Seconds that are to be known for feet to tell the floor; else they are lifted under hips that are lower than
+# this (metres) above it, as those of a body that does not stand. What is as far above the lowest is none.
+SEEN, LOW, ABOUT = 1.0, 0.5, 0.2
 # Metres that are no lift.
 NOTHING = 1e-4
 
 
 def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
-    """(F, n) metres by which joints that are not observed are below the lowest observed one, and which n.
+    """(F, n) metres by which joints that are not observed are under the floor, and which n.
 
-    The joints are those of the humanoid; what is observed is 0 deep, and so are feet under hips that stand.
+    That is the lowest observed joint; for ankles, and for toes, the lowest observed one of these, where that
+    is about as low: knees on which a body kneels may lie deeper than feet ever do. The joints are those of
+    the humanoid; what is observed is 0 deep, and so are feet under hips that stand, where little is known: a
+    single pose may have them in the air.
     """
-    mapping = find_mapping(clip.skeleton)
+    mapping, size = find_mapping(clip.skeleton), feet.size(clip.skeleton)
     joints = list(mapping.mapped[1])
     heights, observed = clip.positions()[..., 1], known.positions(clip.skeleton)
     if not observed.any() or no_humanoid(mapping):
         return np.zeros((len(clip), len(joints))), joints
-    below = np.where(observed, 0.0, heights[observed].min() - heights)
-    stands = below[:, hips_of(clip.skeleton)] < -LOW * feet.size(clip.skeleton)
-    below[:, feet.ends(clip.skeleton)] *= ~stands[:, None]
+    low = float(heights[observed].min())
+    bound = np.full(len(clip.skeleton), low)
+    for kind in feet.pairs(clip.skeleton).T:
+        own = float(np.where(observed, heights, np.inf)[:, kind].min())
+        bound[kind] = own if own - low < ABOUT * size else low
+    below = np.where(observed, 0.0, bound - heights)
+    if known.frames.sum() < SEEN * clip.fps:
+        stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
+        below[:, feet.ends(clip.skeleton)] *= ~stands[:, None]
     return below[:, joints], joints
 
 
