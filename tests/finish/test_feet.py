@@ -191,3 +191,32 @@ def test_stances_are_stiller_by_a_measure_that_lifting_cannot_better(walk, speak
     loose = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
     still, moving = (measures.stance_speed(p, planted, walk.fps) for p in (held, loose))
     assert still < 0.8 * moving
+
+
+def test_a_foot_lets_go_before_its_leg_is_straight(cmu_walk):
+    """Held until the leg is straight, its knee would snap when the foot leaves."""
+    leg = feet.legs(cmu_walk.skeleton)[0]
+    placed = np.repeat(cmu_walk.positions()[[64]], 60, axis=0)
+    length = sum(
+        np.linalg.norm(placed[0, b] - placed[0, a]) for a, b in ((leg.thigh, leg.knee), (leg.knee, leg.ankle))
+    )
+    down = np.array([0.0, -1.0, 0.0])
+    shift = np.zeros((60, 2, 3))
+    # As far as half a leg is nothing to it; at frame 40 more than all of it is asked for.
+    shift[:, :] = (placed[0, leg.thigh] + 0.5 * length * down - placed[0, leg.ankle])[None, None]
+    shift[40, :] = placed[0, leg.thigh] + 1.1 * length * down - placed[0, leg.ankle]
+    share = feet._let_go(leg, placed, shift, 5.0)
+    assert share[40] < 0.01
+    np.testing.assert_allclose(share[[0, 20, 59]], 1.0, atol=1e-6)
+    assert np.abs(np.diff(share)).max() < 0.5
+
+
+def test_a_foot_does_not_leap_from_one_contact_to_the_next(cmu_walk):
+    places = np.zeros((60, 3))
+    first = feet.Contact(10, 30, np.tile([0.1, 0.0, 0.0], (60, 1)), (False, False))
+    near = feet.Contact(31, 40, np.tile([0.13, 0.0, 0.0], (60, 1)), (False, False))
+    far = feet.Contact(31, 40, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, False))
+    later = feet.Contact(45, 55, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, False))
+    tied = feet.Contact(31, 40, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, True))
+    for second, kept in ((near, [first, near]), (far, [first]), (later, [first, later]), (tied, [tied])):
+        assert feet._apart([first, second], places, 30.0) == kept

@@ -36,6 +36,10 @@ OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.02)
 QUICK = 0.50
 # A contact that the method takes for less likely than this is none.
 LIKELY = 0.5
+# Metres a second by which holding may speed a foot up between two contacts.
+LEAP = 1.5
+# The share of its length at which a leg begins to be straight.
+TAUT = 0.97
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -237,6 +241,7 @@ def plant(
             said = stands[:, 2 * leg.side : 2 * leg.side + 2]
             planted &= ~(said < LIKELY)
         shift = _hold(feet, planted, movable, clip.fps, over)
+        shift *= _let_go(leg, placed / grown, shift, over)[:, None, None]
         speeds = measures.speed(feet + shift, clip.fps)
         lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
         lift = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
@@ -264,9 +269,11 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
     away, towards = envelope(movable, over)
     shifts, shares = np.zeros((frames, 2, 3)), np.zeros((frames, 2))
     for joint in range(2):
-        held = [run for run in runs(planted[:, joint]) if movable[slice(*run)].any()]
-        for k, (start, stop) in enumerate(held):
+        held: list[Contact] = []
+        for start, stop in runs(planted[:, joint]):
             inside = np.flatnonzero(movable[start:stop]) + start
+            if not inside.size:
+                continue
             first, last = inside[0], inside[-1]
             # What still moves, or moves already, at the seam is held as far from it as any other contact.
             before = feet[first - 1, joint] if first > start and still[first - 1, joint] else None
@@ -277,18 +284,66 @@ def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float
                 ends = (before if before is not None else after, after if after is not None else before)
                 share = ramp((time - first + 1) / (last - first + 2))[:, None]
                 anchor = (1 - share) * ends[0] + share * ends[1]
+            held.append(Contact(start, stop, anchor, (before is not None, after is not None)))
+        held = _apart(held, feet[:, joint], fps)
+        for k, one in enumerate(held):
+            start, stop = one.start, one.stop
             # No further than half way to the neighbouring contacts, so that their shifts do not add up.
-            left = min(blend, (start - held[k - 1][1]) // 2 + 1) if k else blend
-            right = min(blend, (held[k + 1][0] - stop) // 2 + 1) if k + 1 < len(held) else blend
+            left = min(blend, (start - held[k - 1].stop) // 2 + 1) if k else blend
+            right = min(blend, (held[k + 1].start - stop) // 2 + 1) if k + 1 < len(held) else blend
             share = ramp(1 - (start - time) / (left + 1)) * ramp(1 - (time - stop + 1) / (right + 1))
             share *= movable
             # A seam to which the contact is not tied is reached without a shift.
-            share = share * (1 if before is not None else away) * (1 if after is not None else towards)
+            share = share * (1 if one.tied[0] else away) * (1 if one.tied[1] else towards)
             inner = np.clip(time, start, stop - 1)
-            shifts[:, joint] += share[:, None] * (anchor[inner] - feet[inner, joint])
+            shifts[:, joint] += share[:, None] * (one.anchor[inner] - feet[inner, joint])
             shares[:, joint] = np.maximum(shares[:, joint], share)
     shifts[..., 1] = 0.0
     return shifts + (1 - shares)[..., None] * shifts[:, ::-1]
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One joint stands in the frames start to stop - 1 at an `anchor` (F, 3); `tied` says whether it stands
+    in observed frames before and after."""
+
+    start: int
+    stop: int
+    anchor: np.ndarray
+    tied: tuple[bool, bool]
+
+
+def _apart(held: list[Contact], feet: np.ndarray, fps: float) -> list[Contact]:
+    """The contacts of a joint (F, 3) without those beside which it would have to leap: of two that follow
+    each other at once, and are held in places far apart, the tied one stays, or else the longer one."""
+    kept: list[Contact] = []
+    for one in held:
+        while kept:
+            last = kept[-1]
+            off = last.anchor[last.stop - 1] - feet[last.stop - 1] - one.anchor[one.start] + feet[one.start]
+            if np.linalg.norm(off[[0, 2]]) * fps <= LEAP * (one.start - last.stop + 1):
+                kept.append(one)
+                break
+            longer = last.stop - last.start >= one.stop - one.start
+            if any(last.tied) or (longer and not any(one.tied)):
+                break
+            kept.pop()
+        else:
+            kept.append(one)
+    return kept
+
+
+def _let_go(leg: Leg, placed: np.ndarray, shift: np.ndarray, over: float) -> np.ndarray:
+    """(F,) the share of shifts (F, 2, 3) of ankle and toe that a leg follows: less where it would have to be
+    straight for it, before which a foot lets go. Held until then, its knee would snap when the foot leaves.
+
+    placed: (F, J, 3); over: frames over which it lets go.
+    """
+    hip, knee, ankle = (placed[:, joint] for joint in (leg.thigh, leg.knee, leg.ankle))
+    length = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
+    own, asked = (np.linalg.norm(some - hip, axis=-1) / length for some in (ankle, ankle + shift[:, 0]))
+    taut = ramp((asked - np.maximum(own, TAUT)) / (1 - TAUT))
+    return np.asarray(1.0 - np.minimum(spread(taut, over), 1.0))
 
 
 def _reach(
