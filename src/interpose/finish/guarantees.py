@@ -36,6 +36,8 @@ NOWHERE = 1e4
 MOST = 0.5
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
+# Metres by which nobody is led elsewhere.
+UNMOVED = 0.01
 # A path on which the hips go this much further than without it is said to be too long.
 FURTHER = 1.5
 # Frames solved at once.
@@ -234,7 +236,9 @@ def _along(
         if points := {frame: point for frame, point in path.items() if start <= frame < stop}:
             led = follow(led, start, stop, points)
     nothing = np.zeros_like(known.rotation)
-    layer = Layer(method.name, led, body.raw, nothing, stands=False)
+    # Who goes there anyway stands as firmly as before.
+    same = bool(np.abs(led.positions() - body.clip.positions()).max() < UNMOVED)
+    layer = Layer(method.name, led, body.raw, nothing, stands=same)
     done = _told_of(body, complete(clip, observation, layer, seed, layer, limit, first=first))
     ways = over_floor(body.clip), over_floor(done.clip)
 
