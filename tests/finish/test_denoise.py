@@ -189,3 +189,23 @@ def test_a_foot_on_its_way_at_an_end_of_the_clip_stays_there(cmu_walk, start):
     off = _apart(interpose.denoise(noisy).clip, clip)[:, ends]
     assert off[[0, -1]].max() < 1.5 * off.max(axis=1)[3:-3].max()
     assert off[[0, -1]].max() < 8
+
+
+def test_frames_that_are_noisy_among_others_are_denoised_by_their_own_noise(cmu_walk):
+    """The median of a clip of which a quarter is noisy tells of no noise."""
+    clip = cmu_walk.slice(1, 209)
+    rotation, part = clip.rotation.copy(), slice(80, 130)
+    noise = np.radians(np.random.default_rng(1).normal(0, 1.5, (50, rotation.shape[1], 3)))
+    rotation[part] = rotations.multiply(rotation[part], rotations.exp(noise))
+    noisy = clip.with_motion(rotation, clip.translation)
+    done = tasks.denoise(noisy)
+    before, after = (
+        np.linalg.norm(one.positions() - clip.positions(), axis=-1) for one in (noisy, done.clip)
+    )
+    assert after[part].mean() < 0.6 * before[part].mean()
+    others = np.r_[0:70, 140:207]
+    assert after[others].mean() < 0.002
+    assert done.report.noise is not None
+    (frames,) = done.report.noise.noisy
+    assert all(abs(int(said) - true) < 10 for said, true in zip(frames.split(":"), (80, 130)))
+    assert tasks.denoise(clip).report.noise.noisy == ()

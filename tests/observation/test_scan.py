@@ -247,3 +247,28 @@ def test_frames_that_were_cut_out_and_an_arm_that_goes_on_elsewhere_are_said_to_
         joint for joint in range(len(clip.skeleton)) if arm in clip.skeleton.ancestors(joint)
     }
     assert not [one for one in scan(clip) if one.kind == "jump"]
+
+
+@pytest.mark.parametrize(("every", "real"), [(2, 15), (17, 28)])
+def test_frames_that_are_there_twice_are_said(cmu_walk, every, real):
+    clip = cmu_walk.slice(1, 209)
+    held = np.arange(len(clip))
+    held[every - 1 :: every] -= 1
+    twice = clip.with_motion(clip.rotation[held], clip.translation[held])
+    (found,) = [one for one in scan(twice) if one.kind == "repeated"]
+    assert f"{real} frames a second, in a file of 30" in found.note
+    assert to_gaps([found]) == []
+    assert not [one for one in scan(clip) if one.kind == "repeated"]
+
+
+def test_frames_that_tremble_are_said(cmu_walk):
+    clip, rng = cmu_walk.slice(1, 209), np.random.default_rng(1)
+    for part in (slice(100, 150), slice(0, 208)):
+        rotation = clip.rotation.copy()
+        noise = np.radians(rng.normal(0, 1.5, (*rotation[part].shape[:2], 3)))
+        rotation[part] = rotations.multiply(rotation[part], rotations.exp(noise))
+        found = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "noisy"]
+        assert len(found) == 1
+        assert abs(found[0].start - part.start) < 12
+        assert abs(found[0].stop - part.stop) < 12
+    assert not [one for one in scan(clip) if one.kind == "noisy"]

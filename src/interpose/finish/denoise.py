@@ -9,11 +9,11 @@ the skeleton's own bones are solved back into those.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy import ndimage
 from scipy.linalg import solveh_banded
-from scipy.stats import chi
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
@@ -28,13 +28,10 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
+from interpose.observation.tremor import FEWEST, bursts, deviation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
 
-# The fourth difference of a signal: weights, and how much it amplifies white noise.
-DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-GAIN = float(np.linalg.norm(DIFFERENCE))
-SHORTEST = 8  # frames: less motion cannot be told from noise
 # How stiff smoothers may be: from one that takes out hardly anything to one that leaves parts of a minute.
 STIFF = 10.0 ** np.arange(-1.5, 7.01, 0.5)
 # Seconds (standard deviation) over which smoothers are compared: someone stands, and then runs.
@@ -85,11 +82,11 @@ def denoised(
         RequestError: the range is too short.
     """
     stop = len(clip) if stop is None else stop
-    if stop - start < SHORTEST:
+    if stop - start < FEWEST:
         raise RequestError(
             f"{stop - start} frame{'s' * (stop - start != 1)} cannot be denoised",
             "in so short a motion noise cannot be told from what is meant",
-            f"Take {SHORTEST} frames or more.",
+            f"Take {FEWEST} frames or more.",
         )
     cut, part = clip.slice(start, stop), slice(start, stop)
     free = _free(cut, joints)
@@ -100,9 +97,18 @@ def denoised(
     if strength > 0 and (shaken := _shaken(filled, free)):
         filled = steadied(filled, strength * shaken)
         noise = deviation(filled.positions())
-    done = cut
-    if strength > 0:
-        done = _ease(filled, _smooth(filled, free, strength, noise), start > 0, stop < len(clip))
+    done, noisy = filled if strength > 0 else cut, bursts(filled)
+    # Each part by its own noise: those that are noisy last, as they are eased into what is beside them.
+    for first, last in (*_between(noisy, len(filled)), *noisy):
+        piece, own = filled.slice(first, last), free.slice(first, last)
+        tremble = deviation(piece.positions())
+        noise = np.maximum(noise, tremble) if (first, last) in noisy else noise
+        if strength > 0:
+            calm = _smooth(piece, own, strength, tremble)
+            calm = _ease(done.slice(first, last), calm, start + first > 0, start + last < len(clip))
+            rotation, translation = done.rotation.copy(), done.translation.copy()
+            rotation[first:last], translation[first:last] = calm.rotation, calm.translation
+            done = done.with_motion(rotation, translation)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     rotation[part], translation[part] = done.rotation, done.translation
     result = clip.with_motion(rotation, translation)
@@ -111,8 +117,18 @@ def denoised(
     changed[:, list(clip.translated)] |= (done.translation != cut.translation).any(axis=-1)
     lost = ~(seen.rotation & seen.translation)
     provenance[part] = np.where(lost, Provenance.METHOD, Provenance.SMOOTHED) * changed
-    report = Report("denoise", noise=_report(cut, done, lost, noise, start, strength))
+    told = replace(
+        _report(cut, done, lost, noise, start, strength),
+        noisy=tuple(f"{start + first}:{start + last}" for first, last in noisy),
+    )
+    report = Report("denoise", noise=told)
     return Completion(result, lambda: Raw(result), provenance, report)
+
+
+def _between(ranges: list[tuple[int, int]], frames: int) -> list[tuple[int, int]]:
+    """What lies between ranges, and is long enough to be denoised."""
+    ends = [0, *(end for some in ranges for end in some), frames]
+    return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if b - a >= FEWEST]
 
 
 def _free(clip: Clip, joints: Sequence[int] | None) -> Observation:
@@ -189,16 +205,6 @@ def _report(
         lost.size,
         joints,
     )
-
-
-def deviation(values: np.ndarray) -> np.ndarray:
-    """(n,) the standard deviation of white noise in each coordinate of signals (F, n, d) of a motion.
-
-    The median tells it, so that landings and other jolts do not count. Quaternions have three coordinates.
-    """
-    fourth = sum(w * values[i : len(values) - 4 + i] for i, w in enumerate(DIFFERENCE))
-    length = np.linalg.norm(fourth, axis=-1) / GAIN
-    return np.asarray(np.median(length, axis=0) / chi.median(3))
 
 
 def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -> Clip:

@@ -134,6 +134,7 @@ class NoiseReport:
         broken: how many values of joints were judged broken, and filled.
         values: how many there are: frames times joints.
         joints: each joint.
+        noisy: the frames "START:STOP" that are noisy where the rest is not; `noise` is then theirs.
     """
 
     start: int
@@ -147,6 +148,7 @@ class NoiseReport:
     broken: int
     values: int
     joints: tuple[JointNoise, ...] = field(repr=False)
+    noisy: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         shakiest = max(self.joints, key=lambda one: one.noise)
@@ -157,7 +159,7 @@ class NoiseReport:
         return "\n".join(
             [
                 f"noise: {self.noise:.2f} cm along each axis, estimated (most: {shakiest.joint}, "
-                f"{shakiest.noise:.2f} cm)",
+                f"{shakiest.noise:.2f} cm)" + f", in frames {', '.join(self.noisy)}" * bool(self.noisy),
                 f"broken: {self.broken:,} of {self.values:,} joint rotations or positions{where}"
                 + "; filled" * (self.broken > 0 and self.strength > 0),
                 f"moved: joints by {self.moved:.2f} cm in the mean, at most by {self.moved_most:.2f} cm "

@@ -14,6 +14,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.observation import Gap, Observation
+from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
 from interpose.skeletons.carrier import hips_of, placed
 
@@ -44,8 +45,10 @@ PACE = 0.3
 # A joint, against the hips, or the hips themselves go further than this (metres) from one frame to the next,
 # and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
 TELEPORTS, TIMES = 0.1, 5.0
+# Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
+REPEATS, OFTEN = 3, 0.04
 # Kinds of findings that are no gaps.
-NO_GAPS = ("frozen position", "lost", "jump")
+NO_GAPS = ("frozen position", "lost", "jump", "repeated", "noisy")
 
 
 @dataclass(frozen=True)
@@ -53,7 +56,8 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost" or "jump".
+        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "jump",
+            "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -88,6 +92,9 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       to three frames: what `recover` restores.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
       there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
+    - "repeated": whole frames that are the one before, again and again while the body moves: fewer frames a
+      second than the file says.
+    - "noisy": frames in which the body trembles by more than recorded motion does: what `denoise` smooths.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
     those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
@@ -108,6 +115,9 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         findings += _dead(clip, turned)
         findings += _lost(clip, findings)
         findings += _jumps(clip, known, findings)
+        findings += _repeated(turned, moved, first, clip.fps)
+        if not any(one.kind == "repeated" for one in findings):
+            findings += _noisy(clip, known)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
@@ -306,6 +316,34 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         joints = None if jumps[step, hips] else _topmost(clip, np.flatnonzero(jumps[step]).tolist())
         found.append(Finding("jump", joints, step + 1, step + 2, f"{what} {speed}"))
     return found
+
+
+def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> list[Finding]:
+    """Frames that are the one before though the body moves: one finding; steps as in `_frozen`."""
+    with np.errstate(invalid="ignore"):
+        same = np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
+    brief = [run for run in runs(same) if run[1] - run[0] <= REPEATS and run[0] > 0 and run[1] < len(same)]
+    again = sum(stop - start for start, stop in brief)
+    if not brief or again < OFTEN * (brief[-1][1] - brief[0][0]) or len(brief) < MANY:
+        return []
+    start, stop = brief[0][0], brief[-1][1]
+    real = fps * (1 - again / (stop - start))
+    note = f"{again} frames are the one before: {real:.0f} frames a second, in a file of {fps:.4g}"
+    return [Finding("repeated", None, first + start + 1, first + stop + 1, note)]
+
+
+def _noisy(clip: Clip, known: Observation) -> list[Finding]:
+    """Frames that tremble, where all is known."""
+    if not known.complete or len(clip) < FEWEST:
+        return []
+    places = clip.positions()
+    all_along = [(0, len(clip))] if deviation(places).mean() > NOISY else []
+    return [
+        Finding(
+            "noisy", None, a, b, f"trembles by {100 * deviation(places[a:b]).mean():.1f} cm along each axis"
+        )
+        for a, b in bursts(clip) or all_along
+    ]
 
 
 def _topmost(clip: Clip, joints: list[int]) -> tuple[str, ...]:
