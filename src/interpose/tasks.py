@@ -30,6 +30,7 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken, roughness
+from interpose.observation.exchange import Exchange, exchanges, put_back
 from interpose.observation.part import lay
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons import find_humanoid
@@ -278,9 +279,24 @@ def recover(
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
     if joints is None:
-        seen = _by_itself(clip, start, stop)
-        return fill(clip, seen, method, seed=seed, progress=progress)
+        swapped = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+        sides = put_back(clip, swapped)
+        done = fill(sides, _by_itself(sides, start, stop), method, seed=seed, progress=progress)
+        return _with_sides(done, swapped)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def _with_sides(done: Completion, swapped: Sequence[Exchange]) -> Completion:
+    """A completion that also tells what was on the wrong side, and was put back."""
+    if not swapped:
+        return done
+    provenance, frames = done.provenance.copy(), dict[int, list[str]]()
+    for one in swapped:
+        provenance[one.start : one.stop, one.joints] = Provenance.CORRECTED
+        for joint in one.joints:
+            frames.setdefault(joint, []).append(f"{one.start}:{one.stop}")
+    told = tuple(JointMoments(done.clip.skeleton.names[j], tuple(at)) for j, at in sorted(frames.items()))
+    return replace(done, provenance=provenance, report=replace(done.report, exchanged=told))
 
 
 def _by_itself(clip: Clip, start: int, stop: int) -> Observation:

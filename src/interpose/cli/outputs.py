@@ -175,7 +175,7 @@ def to_json(
             }
             for number, gap in numbered(completion)
         ],
-        **({"moments": report["moments"]} if "moments" in report else {}),
+        **{name: report[name] for name in ("moments", "exchanged") if name in report},
         "units": UNITS,
     }
 
@@ -241,6 +241,10 @@ def compare(clip: Clip, completion: Completion, title: str) -> str:
 def print_report(completion: Completion, fps: float, why: dict[int, str]) -> None:
     """A line for each gap, then what is to be said about single ones, then what stayed open."""
     gaps, report = completion.report.gaps, completion.report
+    if report.exchanged:
+        say(report.sides)
+        if not gaps and not report.moments:
+            return
     if report.moments:
         say(report.momentary)
         for one in report.moments:

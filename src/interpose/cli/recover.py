@@ -38,9 +38,9 @@ def recover(
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
     Without --joints it finds what drops out: joints that snap to their rest
-    pose, or jump away and back (as arms that were taken for each other), within
-    a second, and spikes, at any frames; and hips that stay where they are while
-    they turn. What else is missing is listed, and `interpose fill` fills it.
+    pose, or jump away and back within a second, and spikes, at any frames; arms
+    or legs that were taken for each other; and hips that stay where they are
+    while they turn. What else is missing is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -90,13 +90,13 @@ def recover(
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance, place)
     looked = chosen is None and not place
     others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
-    if not (done.report.gaps or done.report.moments):
+    if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
         if len(clip) > 1 and float(np.ptp(clip.translation, axis=0).max()) < STILL:
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
         raise NothingError(
             f"there is nothing to recover in {file}",
-            "no joint snaps to its rest pose, spikes, or jumps away and back within a second",
+            "no joint snaps to its rest pose, spikes, changes sides, or jumps away and back within a second",
             f"interpose fill {file} fills what else is missing." if others else fix,
             f"{len(others)} gaps, which `interpose fill` fills" if others else "",
             4 if others else 0,

@@ -80,8 +80,8 @@ def from_options(
         if is_report(content) and (verb := content.get("verb")) in OTHERS:
             why = f"{gaps} is of {verb}, which makes what is no gap of the clip that it was given"
             raise RequestError("this report cannot be repeated", why, f"Run interpose {verb} again.")
-        if is_report(content) and (content.get("place") or content.get("moments")):
-            why = f"{gaps} is of recover, which restored what is no gap: where the body is, or moments"
+        if is_report(content) and any(map(content.get, ("place", "moments", "exchanged"))):
+            why = f"{gaps} is of recover, which restored what is no gap"
             raise RequestError("this report cannot be repeated", why, "Run interpose recover again.")
         filled = read_gaps(gaps)
         if is_report(content) and listed:
@@ -112,7 +112,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     found = scan(clip)
     gaps = to_gaps(found)
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
-    dropped = [one for one in found if one.kind == "lost"]
+    dropped = [one for one in found if one.kind in ("lost", "exchanged")]
     stuck = [one for one in found if one.kind == "frozen position"]
     kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(stuck)
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""

@@ -28,6 +28,7 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
+from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.tremor import FEWEST, bursts, deviation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -90,9 +91,10 @@ def denoised(
         )
     cut, part = clip.slice(start, stop), slice(start, stop)
     free = _free(cut, joints)
-    whole = broken(cut)
+    sides = put_back(cut, exchanges(cut)) if joints is None else cut
+    whole = broken(sides)
     seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
-    filled = cut if seen.complete else fill(cut, seen)
+    filled = sides if seen.complete else fill(sides, seen)
     noise = deviation(filled.positions())
     if strength > 0 and (shaken := _shaken(filled, free)):
         filled = steadied(filled, strength * shaken)

@@ -172,7 +172,8 @@ class NoiseReport:
 
 @dataclass(frozen=True)
 class JointMoments:
-    """The frames START:STOP in which a joint was lost for moments, amid known ones; it was interpolated."""
+    """The frames START:STOP in which a joint was lost for moments, amid known ones, and was interpolated; or
+    in which it had the turns of the other side."""
 
     joint: str
     frames: tuple[str, ...]
@@ -181,7 +182,7 @@ class JointMoments:
 @dataclass(frozen=True)
 class Report:
     """The filled gaps of a clip in order of time, those left open, the action that was asked for, what was
-    lost for moments only, and what denoising has to say."""
+    lost for moments only, what was on the wrong side and is put back, and what denoising has to say."""
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
@@ -189,12 +190,14 @@ class Report:
     action: str = ""
     noise: NoiseReport | None = None
     moments: tuple[JointMoments, ...] = ()
+    exchanged: tuple[JointMoments, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
         gaps, left = ([_plain(asdict(gap)) for gap in some] for some in (self.gaps, self.open))
         more = {} if self.noise is None else {"denoised": _plain(asdict(self.noise))}
         more |= {"moments": [_plain(asdict(one)) for one in self.moments]} if self.moments else {}
+        more |= {"exchanged": [_plain(asdict(one)) for one in self.exchanged]} if self.exchanged else {}
         return {"method": self.method, "action": self.action, "gaps": gaps, "open": left, **more}
 
     @property
@@ -206,10 +209,19 @@ class Report:
         named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
         return f"lost for moments and interpolated: {count} time{'s' * (count != 1)}, of {named}"
 
+    @property
+    def sides(self) -> str:
+        """What was on the wrong side, in one line; "" for nothing."""
+        if not self.exchanged:
+            return ""
+        joints, frames = ([one.joint for one in self.exchanged], self.exchanged[0].frames)
+        named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
+        return f"left and right were taken for each other, and are put back: {named}, in {', '.join(frames)}"
+
     def __str__(self) -> str:
         if self.noise is not None:
             return str(self.noise)
-        lines = [self.momentary] if self.moments else []
+        lines = [line for line in (self.sides, self.momentary) if line]
         lines += [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
         return "\n".join(lines) or "nothing is missing"
 

@@ -13,6 +13,7 @@ from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.broken import broken
+from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
@@ -48,7 +49,7 @@ TELEPORTS, TIMES = 0.1, 5.0
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
 # Kinds of findings that are no gaps.
-NO_GAPS = ("frozen position", "lost", "jump", "repeated", "noisy")
+NO_GAPS = ("frozen position", "lost", "exchanged", "jump", "repeated", "noisy")
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "jump",
+        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "exchanged", "jump",
             "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
@@ -90,6 +91,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
+    - "exchanged": arms, or legs, that have each other's turns for a while: `recover` puts them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
       there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
     - "repeated": whole frames that are the one before, again and again while the body moves: fewer frames a
@@ -113,6 +115,12 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
+        swapped, names = exchanges(clip), clip.skeleton.names
+        findings += [
+            Finding("exchanged", tuple(names[j] for j in one.joints), one.start, one.stop, "left and right")
+            for one in swapped
+        ]
+        clip = put_back(clip, swapped)
         findings += _lost(clip, findings)
         findings += _jumps(clip, known, findings)
         findings += _repeated(turned, moved, first, clip.fps)
