@@ -30,7 +30,7 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken, roughness
-from interpose.observation.exchange import Exchange, exchanges, put_back
+from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.part import lay
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons import find_humanoid
@@ -286,7 +286,7 @@ def recover(
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
-def _with_sides(done: Completion, swapped: Sequence[Exchange]) -> Completion:
+def _with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
     """A completion that also tells what was on the wrong side, and was put back."""
     if not swapped:
         return done

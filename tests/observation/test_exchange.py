@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interpose import formats, tasks
-from interpose.observation.exchange import exchanges, put_back
+from interpose.observation.exchange import Flip, exchanges, put_back
 from interpose.observation.scan import scan, to_gaps
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
@@ -56,3 +56,23 @@ def test_what_changes_sides_for_good_is_left(cmu_walk):
     """Of one change alone nobody knows which side of it is the wrong one."""
     clip = cmu_walk.slice(1, 209)
     assert exchanges(swapped(clip, LEG, (100, len(clip)))) == []
+
+
+@pytest.mark.parametrize(
+    "limb", [("RightUpLeg", "RightLeg", "RightFoot"), ("LeftArm", "LeftForeArm", "LeftHand")]
+)
+@pytest.mark.parametrize("part", [(60, 64), (90, 150)])
+def test_a_knee_that_bends_the_other_way_is_found_and_turned_back(cmu_walk, limb, part):
+    """Ankle and foot are where they were: what interpolates the thigh alone throws them about."""
+    clip = cmu_walk.slice(1, 209)
+    joints = tuple(clip.skeleton.index(name) for name in limb)
+    odd = put_back(clip, [Flip(*part, joints)])
+    off = np.abs(odd.positions() - clip.positions())
+    assert off[:, joints[2]].max() < 1e-9
+    assert off[part[0] : part[1], joints[1]].max() > 0.02
+    (found,) = exchanges(odd)
+    assert (found.start, found.stop, found.kind) == (*part, "flipped")
+    done = tasks.recover(odd)
+    assert np.abs(done.clip.positions() - clip.positions())[:, joints].max() < 1e-9
+    (said,) = [one for one in scan(odd) if one.kind == "flipped"]
+    assert said.joints == (limb[0], limb[2])

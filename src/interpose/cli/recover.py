@@ -39,8 +39,8 @@ def recover(
 
     Without --joints it finds what drops out: joints that snap to their rest
     pose, or jump away and back within a second, and spikes, at any frames; arms
-    or legs that were taken for each other; and hips that stay where they are
-    while they turn. What else is missing is listed, and `interpose fill` fills it.
+    or legs that were taken for each other, or bend the other way; and hips that
+    stay where they are while they turn. What else is missing is listed, and `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.

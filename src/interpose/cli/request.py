@@ -112,7 +112,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     found = scan(clip)
     gaps = to_gaps(found)
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
-    dropped = [one for one in found if one.kind in ("lost", "exchanged")]
+    dropped = [one for one in found if one.kind in ("lost", "exchanged", "flipped")]
     stuck = [one for one in found if one.kind == "frozen position"]
     kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(stuck)
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""

@@ -65,8 +65,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
-    if any(one.kind == "exchanged" for one in found):
-        say(f"interpose recover {quote(str(file))} puts limbs back on their side.")
+    if any(one.kind in ("exchanged", "flipped") for one in found):
+        say(f"interpose recover {quote(str(file))} puts limbs back.")
     if any(one.kind == "noisy" for one in found):
         say(f"interpose denoise {quote(str(file))} smooths what trembles.")
     jumps = [one for one in found if one.kind == "jump"]

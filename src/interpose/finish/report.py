@@ -173,7 +173,7 @@ class NoiseReport:
 @dataclass(frozen=True)
 class JointMoments:
     """The frames START:STOP in which a joint was lost for moments, amid known ones, and was interpolated; or
-    in which it had the turns of the other side."""
+    in which it had the turns of the other side, or was turned by half a turn."""
 
     joint: str
     frames: tuple[str, ...]
@@ -214,9 +214,12 @@ class Report:
         """What was on the wrong side, in one line; "" for nothing."""
         if not self.exchanged:
             return ""
-        joints, frames = ([one.joint for one in self.exchanged], self.exchanged[0].frames)
+        joints = [one.joint for one in self.exchanged]
+        frames = sorted(
+            {at for one in self.exchanged for at in one.frames}, key=lambda at: int(at.split(":")[0])
+        )
         named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
-        return f"left and right were taken for each other, and are put back: {named}, in {', '.join(frames)}"
+        return f"taken for the other side, or for half a turn, and put back: {named}, in {', '.join(frames)}"
 
     def __str__(self) -> str:
         if self.noise is not None:

@@ -1,9 +1,10 @@
-"""Left and right taken for each other: a limb has the turns of its like on the other side for a while."""
+"""What some values were taken for, for a while: left for right, or a knee that bends one way for one that
+bends the other way. Both are undone by doing them once more."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from interpose.geometry import rotations
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, SIDES, find_mapping
 
-# Seconds that limbs are exchanged for at most: of longer ones nobody knows which part is the wrong one.
+# Seconds that it lasts at most: of longer ones nobody knows which part is the wrong one.
 LONGEST = 3.0
-# The joints of both limbs turn by more than this from one frame to the next (radians, all together), and by
-# less than this share of it if they change sides: of 200 clips of all data sets none does.
+# The joints concerned turn by more than this from one frame to the next (radians, all together), and by less
+# than this share of it if it is undone: of 200 clips of all data sets those of none do.
 TURN, SHARE = 0.6, 0.35
 
 
@@ -28,48 +29,100 @@ class Exchange:
     left: tuple[int, ...]
     right: tuple[int, ...]
 
+    kind = "exchanged"
+    note = "left and right"
+
     @property
     def joints(self) -> tuple[int, ...]:
         """All of them, in the skeleton's order."""
         return tuple(sorted(self.left + self.right))
 
+    def undone(self, clip: Clip) -> np.ndarray:
+        """The rotations of a clip (F, J, 4) with both on the other side."""
+        rotation = clip.rotation.copy()
+        rotation[:, self.left + self.right] = clip.rotation[:, self.right + self.left]
+        return rotation
 
-def exchanges(clip: Clip) -> list[Exchange]:
-    """Where arms, or legs, change sides and back, in order of time; none of what is no humanoid."""
-    mapping, found = find_mapping(clip.skeleton), []
+
+@dataclass(frozen=True)
+class Flip:
+    """The thigh and shin, or arm and forearm, of a limb are turned by half a turn about the line from hip to
+    ankle, which stays where it is, as does the foot, in the frames start to stop - 1."""
+
+    start: int
+    stop: int
+    limb: tuple[int, int, int]  # thigh, shin and foot, or their like
+
+    kind = "flipped"
+    note = "half a turn about itself"
+
+    @property
+    def joints(self) -> tuple[int, ...]:
+        """Those that turn against their parents."""
+        return self.limb[0], self.limb[2]
+
+    def undone(self, clip: Clip) -> np.ndarray:
+        """The rotations of a clip (F, J, 4) with the limb turned by half a turn."""
+        thigh, shin, foot = self.limb
+        parent, (turned, placed) = clip.skeleton.parents[thigh], clip.kinematics()
+        line = placed[:, foot] - placed[:, thigh]
+        line /= np.maximum(np.linalg.norm(line, axis=1, keepdims=True), 1e-9)
+        half = rotations.exp(np.pi * line)
+        rotation = clip.rotation.copy()
+        above = turned[:, parent] if parent >= 0 else rotations.identity(len(clip))
+        flipped = [rotations.multiply(half, turned[:, joint]) for joint in (thigh, shin)]
+        rotation[:, thigh] = rotations.multiply(rotations.conjugate(above), flipped[0])
+        rotation[:, foot] = rotations.multiply(rotations.conjugate(flipped[1]), turned[:, foot])
+        return rotation
+
+
+def exchanges(clip: Clip) -> list[Exchange | Flip]:
+    """Where arms, or legs, change sides and back, or are flipped, in order of time; none of what is no
+    humanoid."""
+    mapping, found = find_mapping(clip.skeleton), list[Exchange | Flip]()
     for limb in LIMBS:
-        pairs = [(mapping.joints[row], mapping.joints[SIDES[row]]) for row in limb]
+        own = [mapping.joints[row] for row in limb]
+        pairs = [(joint, mapping.joints[SIDES[row]]) for joint, row in zip(own, limb)]
         both = [(a, b) for a, b in pairs if a is not None and b is not None]
-        if not JOINTS[limb[0]].startswith("Left") or not both:
-            continue
-        left, right = (clip.rotation[:, [pair[side] for pair in both]] for side in (0, 1))
-
-        def turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
-            return np.asarray(rotations.angle(before[:-1], after[1:]).sum(axis=1))
-
-        stay = turn(left, left) + turn(right, right)
-        across = turn(left, right) + turn(right, left)
-        cuts = (np.flatnonzero((stay > TURN) & (across < SHARE * stay)) + 1).tolist()
-        at = 0
-        while at + 1 < len(cuts):
-            start, stop = cuts[at : at + 2]
-            if stop - start > LONGEST * clip.fps:
-                at += 1
-                continue
-            found.append(Exchange(start, stop, *(tuple(pair[side] for pair in both) for side in (0, 1))))
-            at += 2
+        if JOINTS[limb[0]].startswith("Left") and both:
+            found += _spells(clip, Exchange(0, 0, *zip(*both)))
+        # Of an arm it is the collar that comes first.
+        bones = own[:3] if JOINTS[limb[0]].endswith("UpLeg") else own[1:]
+        if None not in bones and _chain(clip, bones):  # type: ignore[arg-type]
+            found += _spells(clip, Flip(0, 0, tuple(bones)))  # type: ignore[arg-type]
     return sorted(found, key=lambda one: (one.start, one.joints))
 
 
-def put_back(clip: Clip, found: Sequence[Exchange]) -> Clip:
-    """The clip with the limbs on the sides that they belong to; what a file left in it stays."""
-    if not found:
-        return clip
-    rotation = clip.rotation.copy()
+def put_back(clip: Clip, found: Sequence[Exchange | Flip]) -> Clip:
+    """The clip with all that was found undone; what a file left in it stays."""
     for one in found:
-        part = slice(one.start, one.stop)
-        rotation[part, one.left], rotation[part, one.right] = (
-            clip.rotation[part, one.right],
-            clip.rotation[part, one.left],
-        )
-    return clip.with_motion(rotation, clip.translation)
+        rotation, part = clip.rotation.copy(), slice(one.start, one.stop)
+        rotation[part] = one.undone(clip.slice(one.start, one.stop))
+        clip = clip.with_motion(rotation, clip.translation)
+    return clip
+
+
+def _chain(clip: Clip, bones: Sequence[int]) -> bool:
+    """Whether each joint is the next one's parent: else what lies between would have to be turned, too."""
+    return all(clip.skeleton.parents[b] == a for a, b in zip(bones, bones[1:]))
+
+
+def _spells(clip: Clip, kind: Exchange | Flip) -> list[Exchange | Flip]:
+    """The frames in which something was taken for something else: between two at which it begins and ends."""
+    joints, own = list(kind.joints), clip.rotation
+    other = kind.undone(clip)
+
+    def turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+        return np.asarray(rotations.angle(before[:-1, joints], after[1:, joints]).sum(axis=1))
+
+    stay = turn(own, own)
+    cuts = (np.flatnonzero((stay > TURN) & (turn(own, other) < SHARE * stay)) + 1).tolist()
+    found, at = [], 0
+    while at + 1 < len(cuts):
+        start, stop = cuts[at : at + 2]
+        if stop - start > LONGEST * clip.fps:
+            at += 1
+            continue
+        found.append(replace(kind, start=start, stop=stop))
+        at += 2
+    return found

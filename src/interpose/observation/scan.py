@@ -49,7 +49,7 @@ TELEPORTS, TIMES = 0.1, 5.0
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
 # Kinds of findings that are no gaps.
-NO_GAPS = ("frozen position", "lost", "exchanged", "jump", "repeated", "noisy")
+NO_GAPS = ("frozen position", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,8 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "exchanged", "jump",
+        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "exchanged",
+            "flipped", "jump",
             "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
@@ -92,6 +93,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
     - "exchanged": arms, or legs, that have each other's turns for a while: `recover` puts them back.
+    - "flipped": a thigh and its shin, or an arm, that are turned by half a turn about the line between their
+      ends for a while, so that the knee bends backwards: `recover` turns them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
       there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
     - "repeated": whole frames that are the one before, again and again while the body moves: fewer frames a
@@ -117,7 +120,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         findings += _dead(clip, turned)
         swapped, names = exchanges(clip), clip.skeleton.names
         findings += [
-            Finding("exchanged", tuple(names[j] for j in one.joints), one.start, one.stop, "left and right")
+            Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
             for one in swapped
         ]
         clip = put_back(clip, swapped)
