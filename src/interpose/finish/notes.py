@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.finish import feet, floor, measures
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
+from interpose.skeletons import find_humanoid
+from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
 
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
@@ -27,6 +30,11 @@ DOUBT = 0.15
 # Seconds that should be known on either side of a gap for a network to fill it well. Errors of validation
 # performers are then within 6 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
 BESIDE = 0.1
+# Backwards is against the facing by so much of the way; the real motion of LAFAN1's validation
+# performer goes so at more than BACK (metres a second) in 1 % of 956 pieces of 2 s, and at more than
+# HURRIES times the fastest pace of the seconds around it, or of SLOW (metres a second), in 1 %, too. EVEN:
+# seconds over which paces are evened out.
+BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 0.7, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
 
@@ -83,6 +91,38 @@ def adrift(glide: tuple[float, float | None] | None, finished: Clip, gap: Gap) -
         return []
     said = f"flagged: it glides: in {100 * share:.0f} % of its frames the body travels and no foot stands"
     return [said if usual is None else f"{said} (around it in {100 * usual:.0f} %)"]
+
+
+def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """A note where a body goes backwards, or much faster than around the gap, as nobody would: there is too
+    little time for its way, or the end of it lies behind."""
+    fps, size = finished.fps, feet.size(finished.skeleton)
+    near = round(feet.NEARBY * fps)
+    lo, hi = max(0, gap.start - near), min(len(finished), gap.stop + near)
+    part = finished.slice(lo, hi)
+    body = find_humanoid(part)
+    if gap.joints is not None or not body.mapping.usable or hi - lo < 3:
+        return []
+    placed = body.positions(part)
+    way = np.gradient(placed[:, 0], axis=0)[:, [0, 2]] * fps / size
+    way = ndimage.gaussian_filter1d(way, EVEN * fps, axis=0, mode="nearest")
+    pace = np.linalg.norm(way, axis=1)
+    course = facing(placed) * body.hand[0]
+    ahead = way[:, 0] * np.sin(course) + way[:, 1] * np.cos(course)
+    back = np.where(ahead < -BACKWARDS * pace, pace, 0.0)
+    seen, inside = known.frames[lo:hi], slice(gap.start - lo, gap.stop - lo)
+    frame = inside.start + int(back[inside].argmax())
+    if back[frame] > max(BACK, 1.2 * float(back[seen].max(initial=0.0))):
+        said = (
+            f"flagged: it goes backwards at up to {back[frame] * size:.1f} m/s (frame {first + lo + frame})"
+        )
+        return [f"{said}: more frames, or a key in which it has turned, help"]
+    fastest, usual = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
+    if seen.sum() >= fps / 2 and fastest > HURRIES * max(usual, SLOW):
+        frames = math.ceil(len(gap) * fastest / max(usual, SLOW))
+        paces = f"{fastest * size:.1f} m/s, where the motion around it goes at {usual * size:.1f}"
+        return [f"flagged: it hurries: up to {paces}. With about {frames} frames it would not"]
+    return []
 
 
 def liveliness(finished: Clip, gap: Gap) -> float | None:
