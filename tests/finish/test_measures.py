@@ -103,12 +103,12 @@ def test_a_hand_under_the_floor_is_said(cmu_walk):
 
 
 def test_who_goes_backwards_or_hurries_is_told(cmu_walk):
-    """Poses of a walk whose hips are led back, or on at four times their pace; nothing of the walk."""
+    """Poses of a walk whose hips are led back, or on at eight times their pace; nothing of the walk."""
     clip, gap = cmu_walk.slice(30, 209), Gap(60, 120)
     known = Observation.from_gaps(clip, [gap])
     assert notes.hasty(clip, known, gap, 0) == []
     steps = np.diff(clip.translation[:, 0], axis=0, prepend=clip.translation[:1, 0])
-    for factor, word in ((-2.5, "backwards"), (4.0, "hurries")):
+    for factor, word in ((-4.0, "backwards"), (8.0, "hurries")):
         led, translation = steps.copy(), clip.translation.copy()
         led[60:120] *= [factor, 1.0, factor]
         translation[:, 0] = np.cumsum(led, axis=0) + clip.translation[0, 0]
