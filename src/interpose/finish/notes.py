@@ -9,6 +9,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.finish import feet, floor, measures
+from interpose.finish.windows import grow
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid
@@ -110,7 +111,12 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     course = facing(placed) * body.hand[0]
     ahead = way[:, 0] * np.sin(course) + way[:, 1] * np.cos(course)
     back = np.where(ahead < -BACKWARDS * pace, pace, 0.0)
-    seen, inside = known.frames[lo:hi], slice(gap.start - lo, gap.stop - lo)
+    inside = slice(gap.start - lo, gap.stop - lo)
+    # Evened out, the frames beside the gap go half as it does.
+    beside = grow(
+        (np.arange(hi - lo) >= inside.start) & (np.arange(hi - lo) < inside.stop), round(3 * EVEN * fps)
+    )
+    seen = known.frames[lo:hi] & ~beside
     frame = inside.start + int(back[inside].argmax())
     if back[frame] > max(BACK, 1.2 * float(back[seen].max(initial=0.0))):
         said = (
