@@ -71,8 +71,7 @@ def test_results_go_into_a_folder_and_folders_within_folders_are_looked_into(run
     done = run("scan", "takes", "--json")
     names = ["takes/a.bvh", "takes/b.bvh", "takes/day/c.bvh", "takes/day/d.bvh"]
     assert [one["input"] for one in done.json] == names
-    (takes.parent / "done").mkdir()
-    assert run("fill", "takes", "--method", "spline", "-o", "done").code == 3
+    assert run("fill", "takes", "--method", "spline", "-o", "done/").code == 3
     made = sorted(path.name for path in (takes.parent / "done").iterdir())
     assert made == ["b.bvh", "b.json", "d.bvh", "d.json"]
     assert not [*takes.rglob("*.filled.*")]

@@ -31,11 +31,13 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
         if files == [file] and file.is_dir():
             raise _empty(file)
         folder: Path | None = options.get("output")
+        if folder is not None and not folder.exists() and folder.suffix.lower() not in MOTION:
+            folder.mkdir(parents=True)
         if folder is not None and not folder.is_dir():
             raise RequestError(
                 "--output names one file",
                 f"{len(files)} files are to be written",
-                "Name a folder that is there; or leave it out: each lies beside what it was made of.",
+                "Name a folder; or leave it out: each lies beside what it was made of.",
             )
         codes, reports = [], []
         for path in files:
