@@ -232,7 +232,7 @@ def compare(clip: Clip, completion: Completion, title: str) -> str:
     if clip is not completion.clip:
         takes.append(Take("input", clip.positions(), "#6b7280", ghost=True))
     report = completion.report
-    brief = [Gap.parse(at, (one.joint,)) for one in report.moments for at in one.frames]
+    brief = [Gap.parse(at, (one.joint,)) for one in (*report.moments, *report.exchanged) for at in one.frames]
     gaps = [*report.gaps, *brief]
     text, names_ = str(completion.report), clip.skeleton.names
     return player(takes, clip.skeleton.parents, clip.fps, gaps, title=title, report=text, names=names_)

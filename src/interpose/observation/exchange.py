@@ -30,7 +30,7 @@ class Exchange:
     right: tuple[int, ...]
 
     kind = "exchanged"
-    note = "left and right"
+    note = "left and right are taken for each other"
 
     @property
     def joints(self) -> tuple[int, ...]:
