@@ -116,6 +116,9 @@ def stmi_gan(
 ) -> None:
     """Write stmi-gan.onnx, its card stmi-gan.json, and the training log with its curves.
 
+    What was trained with config=dense is called stmi-gan-dense. The discriminator
+    lies beside: a run that starts from these weights goes on against it.
+
     Try:
       interpose export stmi-gan --run runs/stmi --packs packs --out weights/stmi-gan
 

@@ -14,6 +14,7 @@ METHODS = {
     "spline": "smooth curve with the velocity on both sides; best for short gaps",
     "cmib": "conditional in-betweening of Kim et al. 2022: between keys, with an action if you like",
     "stmi-gan": "the spatio-temporal inpainting GAN of Hernandez Ruiz et al. 2019: forecasts, with samples",
+    "stmi-gan-dense": "the same at 30 frames a second: forecasts that keep moving, and gaps, roughly",
     "small": "interpose's own network: gaps, lost joints and limbs, pins; any part of a pose is enough",
     "small-open": "the same network, of weights for any use, learned from CMU's data alone",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020: gaps from half a second to four",

@@ -22,6 +22,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "cae": ("interpose.methods.cae", "Cae"),
     "cmib": ("interpose.methods.cmib", "Cmib"),
     "stmi-gan": ("interpose.methods.stmi_gan", "StmiGan"),
+    "stmi-gan-dense": ("interpose.methods.stmi_gan", "dense"),
     "small": ("interpose.methods.base", "small"),
     "small-open": ("interpose.methods.base", "small_open"),
 }

@@ -27,11 +27,12 @@ class StmiGan:
     Attributes:
         trained: the weights; the installed ones without any.
         temperature: how much noise is injected, as a share of what it was trained with; without a seed none.
+        name: of the weights: stmi-gan, the paper's network, or stmi-gan-dense.
     """
 
     trained: weights.Card | None = None
     temperature: float = 1.0
-    name = "stmi-gan"
+    name: str = "stmi-gan"
 
     @property
     def card(self) -> weights.Card:
@@ -62,6 +63,11 @@ class StmiGan:
             return run_long(self.card, positions, seen, rng, self.temperature)
 
         return positional.speak(clip, observation, self.card, network, 0)
+
+
+def dense() -> StmiGan:
+    """The one of 30 frames a second, which fills gaps, too."""
+    return StmiGan(name="stmi-gan-dense")
 
 
 def run(

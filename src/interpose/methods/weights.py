@@ -167,10 +167,12 @@ def allowed(card: Card) -> Card:
 
 
 def find(method: str) -> Card:
-    """The weights that a method runs. Raises RequestError when there are none, or none that may be used."""
-    for card in cards():
-        if card.method == method and card.onnx.exists():
-            return allowed(card)
+    """The weights that a method runs: those of its name, or else any. Raises RequestError when there are
+    none, or none that may be used."""
+    there = [card for card in cards() if card.onnx.exists()]
+    named = [card for card in there if card.name == method]
+    for card in named or [card for card in there if card.method == method]:
+        return allowed(card)
     raise RequestError(
         f"there are no weights for the method {method}",
         f"none lie in {' or '.join(map(str, folders())) or 'any of the places for them'}",

@@ -454,26 +454,27 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
 
 def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder, and the
-    discriminator, against which a run that starts from these weights goes on."""
+    discriminator, against which a run that starts from these weights goes on. Those of `config=dense` are
+    called stmi-gan-dense."""
     run = _Run.of(folder)
     settings, log = run.settings, run.log
     config = StmiGanConfig.of(settings["network"])
-    model = Generator(config)
-    export_stmi_gan_onnx(model, run.begin(out, "stmi-gan", model))
+    model, name = Generator(config), "stmi-gan-dense" if settings["config"] == "dense" else "stmi-gan"
+    export_stmi_gan_onnx(model, run.begin(out, name, model))
     state = torch.load(folder / "checkpoint.pt", map_location="cpu", weights_only=False)
     if judge := state.get("opponent"):
         halves = {name: value.half().contiguous() for name, value in judge.items()}
         (out / JUDGE).write_bytes(save(halves))
     hours = [entry["hours"] for entry in log]
     curve = {"generator": (hours, [entry["loss"] for entry in log])}
-    line_plot(curve, "device hours", "weighted loss", "Training of stmi-gan", path=out / "loss.svg")
+    line_plot(curve, "device hours", "weighted loss", f"Training of {name}", path=out / "loss.svg")
     moves = {
         f"{q}. quarter of the forecast": (hours, [entry[f"moves{q}"] for entry in log]) for q in range(1, 5)
     }
     title = "Validation performers"
     line_plot(moves, "device hours", "share of the truth's motion", title, path=out / "validation.svg")
     card = Card(
-        name="stmi-gan",
+        name=name,
         method="stmi-gan",
         description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
         licence=_licence(packs),
@@ -486,7 +487,7 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         training=run.training("stmi-gan", splits, model),
         metrics={"validation": log[-1]},
     )
-    card.save(out / "stmi-gan.json")
+    card.save(out / f"{name}.json")
     return card
 
 
