@@ -103,3 +103,10 @@ def test_where_the_floor_is_and_which_way_a_body_faces_makes_no_difference(lying
     here = floor.lifted(sunk(lying), seen, span)
     there = floor.lifted(elsewhere(sunk(lying)), seen, span)
     np.testing.assert_allclose(there.positions(), elsewhere(here).positions(), atol=1e-6)
+
+
+def test_an_upper_body_tells_no_floor(cmu_walk):
+    """Of legs that are lost all along: the lowest joint that is known is the hips."""
+    legs = tuple(name for name in cmu_walk.skeleton.names if "Leg" in name or "Foot" in name or "Toe" in name)
+    seen = Observation.from_gaps(cmu_walk, [Gap(0, len(cmu_walk), legs)])
+    assert floor.lifted(cmu_walk, seen, (0, len(cmu_walk))) is cmu_walk

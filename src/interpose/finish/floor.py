@@ -35,25 +35,28 @@ NOTHING = 1e-4
 def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
     """(F, n) metres by which joints that are not observed are under the floor, and which n.
 
-    That is the lowest observed joint; for ankles, and for toes, the lowest observed one of these, where that
-    is about as low: knees on which a body kneels may lie deeper than feet ever do. The joints are those of
-    the humanoid; what is observed is 0 deep, and so are feet under hips that stand, where little is known: a
-    single pose may have them in the air.
+    That is the lowest observed joint of poses of which a foot is; for ankles, and for toes, the lowest one of
+    these, where that is about as low: knees on which a body kneels may lie deeper than feet ever do. The
+    joints are those of the humanoid; what is observed is 0 deep, and so are feet under hips that stand, where
+    little is known: a single pose may have them in the air. Where no foot is observed nothing is deep: an
+    upper body tells no floor.
     """
     mapping, size = find_mapping(clip.skeleton), feet.size(clip.skeleton)
-    joints = list(mapping.mapped[1])
+    joints, ends = list(mapping.mapped[1]), feet.ends(clip.skeleton)
     heights, observed = clip.positions()[..., 1], known.positions(clip.skeleton)
-    if not observed.any() or no_humanoid(mapping):
+    tells = observed[:, ends].any(axis=1)
+    if not tells.any() or no_humanoid(mapping):
         return np.zeros((len(clip), len(joints))), joints
-    low = float(heights[observed].min())
+    heard = np.where(observed, heights, np.inf)[tells]
+    low = float(heard.min())
     bound = np.full(len(clip.skeleton), low)
     for kind in feet.pairs(clip.skeleton).T:
-        own = float(np.where(observed, heights, np.inf)[:, kind].min())
+        own = float(heard[:, kind].min())
         bound[kind] = own if own - low < ABOUT * size else low
     below = np.where(observed, 0.0, bound - heights)
-    if known.frames.sum() < SEEN * clip.fps:
+    if tells.sum() < SEEN * clip.fps:
         stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
-        below[:, feet.ends(clip.skeleton)] *= ~stands[:, None]
+        below[:, ends] *= ~stands[:, None]
     return below[:, joints], joints
 
 
