@@ -34,6 +34,21 @@ def test_what_it_was_not_trained_for(cmu_walk):
     assert method.refuses(cmu_walk, Gap(60, 90, ("LeftForeArm",))) is None
 
 
+def test_the_dense_network_forecasts_and_fills_at_every_frame(cmu_walk):
+    method = registry.get("stmi-gan-dense")
+    assert method.refuses(cmu_walk, Gap(60, 90)) is None
+    assert method.refuses(cmu_walk.slice(0, 90), Gap(50, 90)) is None
+    assert method.card.fps == 30
+    done = tasks.forecast(cmu_walk, 60, method="stmi-gan-dense").clip
+    steps = np.linalg.norm(np.diff(done.positions()[:, 0, [0, 2]], axis=0), axis=1)
+    assert 0.5 < steps[-60:].mean() / steps[-120:-60].mean() < 2.0
+    filled = tasks.fill(cmu_walk, [Gap(80, 110)], "stmi-gan-dense")
+    assert filled.report.gaps[0].method == "stmi-gan-dense"
+    off = np.linalg.norm(filled.clip.positions() - cmu_walk.positions(), axis=-1)
+    assert off[80:110].mean() < 0.25
+    assert not off[:80].any()
+
+
 def test_coarse_frames_are_woven_into_what_is_known():
     """Through all that is known, through what is said away from it, and straight where both are."""
     frames, times = np.arange(60.0), np.arange(0, 62, 6.0)

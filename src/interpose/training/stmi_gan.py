@@ -9,8 +9,8 @@ The rows of its table 1 are settings of it:
     +Motion disc   branches=base,motion
 
 The network of 30 frames a second, `config=dense`, says all frames; the losses and the discriminator look at
-one at random of each fifth of a second, as the paper's. It begins with what that has learned:
-`--start stmi-gan --set config=dense --set lead=.15`.
+one at random of each fifth of a second, as the paper's. It begins from nothing (`--set config=dense`), or
+with what that one has learned (`--start stmi-gan --set config=dense --set lead=.15`).
 """
 
 from __future__ import annotations
