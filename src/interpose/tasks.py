@@ -345,10 +345,17 @@ def denoise(
         Gap(start, stop).check(len(clip))
     chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
     if method == "auto":
-        return denoised(clip, strength, chosen, start, stop)
-    registry.get(method)
-    return denoised(
-        clip, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
+        done = denoised(clip, strength, chosen, start, stop)
+    else:
+        registry.get(method)
+        done = denoised(
+            clip, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
+        )
+    if chosen is not None or not strength:
+        return done
+    swapped = exchanges(clip.slice(start, stop))
+    return _with_sides(
+        done, [replace(one, start=one.start + start, stop=one.stop + start) for one in swapped]
     )
 
 

@@ -47,6 +47,17 @@ def test_recover_puts_them_back_and_says_so(cmu_walk):
     assert (done.provenance[80:104, clip.skeleton.index("LeftLeg")] > 0).all()
 
 
+def test_denoise_puts_them_back_and_says_so(cmu_walk):
+    clip = cmu_walk.slice(1, 209)
+    odd = swapped(clip, LEG, (80, 104))
+    done = tasks.denoise(odd, frames=(50, 150))
+    off = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1)
+    assert off.max() < 0.03
+    assert {at for one in done.report.exchanged for at in one.frames} == {"80:104"}
+    assert "put back" in str(done.report)
+    assert tasks.denoise(odd, 0).clip.rotation.tobytes() == odd.rotation.tobytes()
+
+
 @pytest.mark.parametrize("name", ["cmu_walk.bvh", "cmu_run.bvh", "cmu_jump.bvh"])
 def test_nothing_is_exchanged_in_real_clips(data, name):
     assert exchanges(formats.load(data / name)) == []

@@ -223,7 +223,7 @@ class Report:
 
     def __str__(self) -> str:
         if self.noise is not None:
-            return str(self.noise)
+            return "\n".join(line for line in (self.sides, str(self.noise)) if line)
         lines = [line for line in (self.sides, self.momentary) if line]
         lines += [str(gap) for gap in self.gaps] + [f"gap {gap}: left open" for gap in self.open]
         return "\n".join(lines) or "nothing is missing"
