@@ -279,11 +279,16 @@ def recover(
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
     if joints is None:
-        swapped = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+        swapped = _swapped(clip, start, stop)
         sides = put_back(clip, swapped)
         done = fill(sides, _by_itself(sides, start, stop), method, seed=seed, progress=progress)
         return _with_sides(done, swapped)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def _swapped(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
+    """What was taken for something else within the frames start to stop - 1."""
+    return [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
 
 
 def _with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
@@ -344,19 +349,15 @@ def denoise(
     if frames is not None:
         Gap(start, stop).check(len(clip))
     chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
+    swapped = _swapped(clip, start, stop) if chosen is None and strength else []
+    sides = put_back(clip, swapped)
     if method == "auto":
-        done = denoised(clip, strength, chosen, start, stop)
-    else:
-        registry.get(method)
-        done = denoised(
-            clip, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
-        )
-    if chosen is not None or not strength:
-        return done
-    swapped = exchanges(clip.slice(start, stop))
-    return _with_sides(
-        done, [replace(one, start=one.start + start, stop=one.stop + start) for one in swapped]
+        return _with_sides(denoised(sides, strength, chosen, start, stop), swapped)
+    registry.get(method)
+    done = denoised(
+        sides, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
     )
+    return _with_sides(done, swapped)
 
 
 def between(

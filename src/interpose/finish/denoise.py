@@ -28,7 +28,6 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
-from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.tremor import FEWEST, bursts, deviation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -91,10 +90,9 @@ def denoised(
         )
     cut, part = clip.slice(start, stop), slice(start, stop)
     free = _free(cut, joints)
-    sides = put_back(cut, exchanges(cut)) if joints is None else cut
-    whole = broken(sides)
+    whole = broken(cut)
     seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
-    filled = sides if seen.complete else fill(sides, seen)
+    filled = cut if seen.complete else fill(cut, seen)
     noise = deviation(filled.positions())
     if strength > 0 and (shaken := _shaken(filled, free)):
         filled = steadied(filled, strength * shaken)
