@@ -51,6 +51,7 @@ __all__ = [
     "load",
     "method_names",
     "recover",
+    "retarget",
     "save",
     "scan",
     "stitch",
@@ -333,8 +334,8 @@ def stitch(
     stays where it is; following ones are turned about the vertical and shifted over the floor as a whole.
 
     Args:
-        clips: clips or paths, on skeletons with the same joints; one is enough for a loop.
-            `clip.slice(12, 80)` is a part of one.
+        clips: clips or paths; one is enough for a loop. `clip.slice(12, 80)` is a part of one. What is of
+            another rig than the first is brought onto its skeleton (`retarget`).
         frames: how many frames to generate: one number, or one for each gap; "auto" chooses what is
             unhurried.
         action: what the motion in the gaps is ("walk", ...), for methods that know actions.
@@ -348,13 +349,35 @@ def stitch(
         where each clip lies, and `.loop` how a loop closes.
 
     Raises:
-        RequestError: nothing to stitch, an empty clip, other skeletons, lengths that do not fit, and what
-            `fill` refuses.
+        RequestError: nothing to stitch, an empty clip, another skeleton that is no humanoid, lengths that do
+            not fit, and what `fill` refuses.
         FileError: a file cannot be read.
     """
     from interpose import tasks
 
     return tasks.stitch([_clip(clip) for clip in clips], frames, align, loop, action, method, seed, progress)
+
+
+def retarget(clip: Clip | str | Path, like: Clip | str | Path) -> Clip:
+    """The motion of one humanoid on the skeleton of another one.
+
+    Joints are turned from their T-pose as the other body's are; ways and heights go by the legs' lengths, and
+    feet that stand still stand still.
+
+    Args:
+        clip: the motion, a clip or a path.
+        like: a clip or a path: the skeleton, the layout of its file, and where its floor is.
+
+    Returns:
+        As many frames as `clip` has, at its rate. `save` writes them in the layout of `like`.
+
+    Raises:
+        RequestError: one of the skeletons is no humanoid, or its T-pose cannot be found.
+        FileError: a file cannot be read.
+    """
+    from interpose import finish
+
+    return finish.retarget(_clip(clip), _clip(like))
 
 
 def _clip(clip: Clip | str | Path) -> Clip:

@@ -14,7 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, GapReport, Report, complete, seams
+from interpose.finish import Completion, GapReport, Report, complete, on_rig_of, seams
 from interpose.finish import pins as pinning
 from interpose.finish.denoise import denoised
 from interpose.finish.feet import legs
@@ -31,7 +31,7 @@ from interpose.methods.protocol import Method, Raw, Sampler
 from interpose.observation import Gap, Observation, Part, Pin, timeline
 from interpose.observation.broken import broken, roughness
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
-from interpose.observation.part import lay
+from interpose.observation.part import lay, misfits
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.carrier import placed as placing
@@ -92,7 +92,8 @@ def fill(
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
         action: what the motion in the gaps is, for methods that know actions; "auto" then is one of them.
-        parts: poses of single joints that other clips give inside of the gaps.
+        parts: poses of single joints that other clips give inside of the gaps; of other rigs they are brought
+            onto this one's first.
         path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
         temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
@@ -110,7 +111,7 @@ def fill(
     if seed is not None and seed < 0:
         raise RequestError(f"cannot take the seed {seed}", "it is a number from 0 on", "Write --seed 1.")
     observation = replace(observation, pins=(*observation.pins, *pins))
-    clip, observation = lay(clip, observation, parts)
+    clip, observation = lay(clip, observation, fitted(parts, clip))
     momentary = isinstance(gaps, Observation) and not observation.pins
     brief = _momentary(clip, observation) if momentary else None
     if brief and method in ("auto", "spline"):
@@ -168,6 +169,11 @@ def fill(
     return Completion(
         whole.with_motion(rotation, translation), lambda: _put_together(whole, said), provenance, report
     )
+
+
+def fitted(parts: Iterable[Part], clip: Clip) -> list[Part]:
+    """Parts on the skeleton of a clip, whatever rig they are of."""
+    return [replace(part, clip=on_rig_of(part.clip, clip)) if misfits(clip, part) else part for part in parts]
 
 
 def _momentary(clip: Clip, observation: Observation) -> Observation | None:
@@ -569,12 +575,14 @@ def stitch(
     beginning is laid at the end once more, as what the last gap leads to, and then taken away again.
 
     Args:
-        clips, frames, align, loop: as in `timeline.lay`.
+        clips, frames, align, loop: as in `timeline.lay`; the motion of what is on another rig than the first
+            clip is brought onto that one's skeleton first (`retarget`).
         action, method, seed, progress: as in `fill`.
 
     Raises:
-        RequestError: what `timeline.lay` and `fill` refuse.
+        RequestError: what `on_rig_of`, `timeline.lay` and `fill` refuse.
     """
+    clips = [on_rig_of(clip, clips[0]) if len(clip) else clip for clip in clips]
     line = timeline.lay(clips, frames, align, loop)
     if frames == "auto" and align:
         lengths, whys = _tried(line, method, action, seed)

@@ -100,13 +100,13 @@ def test_reach_never_stretches_and_keeps_the_foot(walk):
     turned, placed = walk.kinematics()
     goal = placed[:, [leg.ankle, leg.toe]] + [0.05, 0.08, -0.04]
     bent = walk.with_motion(
-        feet._reach(walk.skeleton, leg, walk.rotation, turned, placed, goal), walk.translation
+        feet.reach(walk.skeleton, leg, walk.rotation, turned, placed, goal), walk.translation
     )
     assert np.abs(bent.positions()[:, leg.ankle] - goal[:, 0]).max() < 0.012
     assert np.allclose(bent.kinematics()[0][:, leg.ankle], turned[:, leg.ankle], atol=1e-6)
     far = goal - np.array([0.0, 1.0, 0.0])
     straight = walk.with_motion(
-        feet._reach(walk.skeleton, leg, walk.rotation, turned, placed, far), walk.translation
+        feet.reach(walk.skeleton, leg, walk.rotation, turned, placed, far), walk.translation
     ).positions()
     way, wanted = straight[:, leg.ankle] - straight[:, leg.thigh], far[:, 0] - placed[:, leg.thigh]
     cosine = (way * wanted).sum(-1) / np.linalg.norm(way, axis=-1) / np.linalg.norm(wanted, axis=-1)

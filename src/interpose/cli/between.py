@@ -39,11 +39,11 @@ def between(
 
     Keys are frames of one file, or poses of several: then the motion begins
     with --start, --frames new frames follow, and --target is the last, on the
-    body of --start. How it leaves the one and meets the other is told by the
-    frames beside them in their files. What lies between the keys of a file has
-    no influence; what lies before the first and after the last one stays as it
-    is. Writes the clip and a report beside the input: keys.between.bvh and
-    keys.between.json.
+    body of --start, to which other rigs are retargeted. How it leaves the one and
+    meets the other is told by the frames beside them in their files. What lies
+    between the keys of a file has no influence; what lies before the first and
+    after the last one stays as it is. Writes the clip and a report beside the
+    input: keys.between.bvh and keys.between.json.
 
     Try:
       interpose between keys.bvh --keys 0,30,75
@@ -105,15 +105,20 @@ def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
 ) -> tuple[Path, list[int], Clip, str]:
     """A clip that holds poses of several files at its keys, and before the first and after the last one what
-    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and a
-    line for the user where the length was proposed."""
+    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and
+    lines for the user."""
     from interpose import tasks
+    from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
     from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
     from interpose.skeletons.carrier import hips_of
 
     file, before, last = _pose(start, -1, reading)
     _, after, first = _pose(target, 0, reading)
+    own, after = after, on_rig_of(after, before)
+    said = (
+        [] if after is own else [f"{target} is on another rig: its motion was retargeted to that of {start}"]
+    )
     held = _frame_of(before, last)
     poses = {0: held}
     for text in anchors:
@@ -122,8 +127,8 @@ def _blocked(
             why = "it is FILE@AT, with AT from 1 on"
             raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
         _, clip, frame = _pose(what, 0, reading)
-        poses[int(at)] = fit(_frame_of(clip, frame), held)[0]
-    met, end, said = max(poses), fit(_frame_of(after, first), held)[0], ""
+        poses[int(at)] = fit(_frame_of(on_rig_of(clip, before), frame), held)[0]
+    met, end = max(poses), fit(_frame_of(after, first), held)[0]
     beside = fit(after, before)[0]
     moment = min(round(first * before.fps / after.fps), len(beside) - 1)
     if frames == "auto":
@@ -131,7 +136,8 @@ def _blocked(
         here = (poses[met], 0) if met else (before, last)
         count, why = plausible_length(*here, beside, moment)
         count += met
-        said = f"{count} frame{'s' * (count > 1)}: {why}" + (f" after the anchor at {met}" if met else "")
+        later = f" after the anchor at {met}" if met else ""
+        said.append(f"{count} frame{'s' * (count > 1)}: {why}{later}")
     elif frames.isdecimal() and int(frames) > 0:
         count = int(frames)
     else:
@@ -155,7 +161,7 @@ def _blocked(
     shift = (float(laid[0] - lay[0]), 0.0, float(laid[2] - lay[2]))
     on = Placement(shift=shift).of(beside.slice(moment + 1, until))
     parts = [before.slice(since, last), blocked, on]
-    return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), said
+    return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), "\n".join(said)
 
 
 def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip, int]:

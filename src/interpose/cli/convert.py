@@ -1,16 +1,19 @@
-"""interpose convert: another format, another rate."""
+"""interpose convert: another format, another rate, another skeleton."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from interpose.cli.console import say
+from interpose.cli.console import names, say
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
 
 FASTEST = 1000.0  # frames a second
 
@@ -21,10 +24,11 @@ def convert(
     /,
     *,
     fps: float | None = None,
+    onto: Path | None = None,
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
 ) -> None:
-    """Write a clip in another format, or at another frame rate.
+    """Write a clip in another format, at another frame rate, or on another skeleton.
 
     A file that becomes one of its format again keeps its layout and units, and at the same rate every
     number's text. Other BVH is written in centimetres, Y up. The suffix says the
@@ -34,15 +38,20 @@ def convert(
       interpose convert take.bvh take.npz
       interpose convert take.amc take.bvh --skeleton subject.asf
       interpose convert take.bvh take30.bvh --fps 30
+      interpose convert take.bvh mine.bvh --onto rig.bvh
 
     Args:
         file: the clip to read.
         output: the file to write.
         fps: frames a second of what is written.
+        onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
+            as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
         force: replace an existing file.
     """
+    from interpose.finish import on_rig_of
     from interpose.formats import save
     from interpose.geometry.time import resample
+    from interpose.observation.timeline import fit
 
     clip = reading.load(file)
     if output.exists() and output.samefile(file):
@@ -56,9 +65,24 @@ def convert(
             "nobody records or plays that",
             f"Choose up to {FASTEST:g}.",
         )
-    made = replace(resample(clip, fps, smooth=True), source=clip.source) if fps is not None else clip
+    made, kept = clip, ""
+    if onto is not None:
+        rig = replace(reading.load(onto), fps=clip.fps)
+        put = on_rig_of(clip, rig)
+        made = replace(fit(put, rig)[0], source=rig.source)
+        kept = _kept(rig) if put is not clip else ""
+    made = replace(resample(made, fps, smooth=True), source=made.source) if fps is not None else made
     notes = save(replace(made, name=output.stem), output, force=force)
     say("\n".join(describe(file, clip)))
-    for note in notes:
+    for note in (*([kept] if kept else []), *notes):
         say(f"note: {note}")
     say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps")
+
+
+def _kept(rig: Clip) -> str:
+    """What other rigs tell nothing of."""
+    from interpose.skeletons import find_mapping
+
+    mapped = find_mapping(rig.skeleton).mapped[1]
+    others = [name for joint, name in enumerate(rig.skeleton.names) if joint not in mapped]
+    return f"{names(others, most=4)}: as in {rig.name}, in the mean" if others else ""

@@ -73,7 +73,8 @@ def fill(
         gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip; or those that --from gives.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
-        from_: another clip of the same character that gives poses of the --joints inside of a gap.
+        from_: another clip that gives poses of the --joints inside of a gap, named as in this one; what is of
+            another rig is retargeted.
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
         layer: the --joints alone are another clip's, and eased in and out; all else stays as it is, where
@@ -183,7 +184,8 @@ def _dry_run(
     from interpose.observation import Observation
     from interpose.observation.part import lay
 
-    clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), [part for _, part in request.parts])
+    parts = tasks.fitted([part for _, part in request.parts], clip)
+    clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), parts)
     seen = replace(seen, pins=tuple(pins))
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
     left = any(job.method is None for job in jobs)

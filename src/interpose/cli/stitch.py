@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -32,13 +32,15 @@ class Piece:
     Attributes:
         file: where it is.
         part: START:STOP, or None for all of it.
-        whole, clip: all of the file, and what is meant of it.
+        whole, clip: all of the file, and what is meant of it, on the first file's skeleton.
+        retargeted: whether that is of another rig.
     """
 
     file: Path
     part: str | None
     whole: Clip
     clip: Clip
+    retargeted: bool = False
 
     def __str__(self) -> str:
         return f"{self.file}#{self.part}" if self.part else str(self.file)
@@ -62,10 +64,10 @@ def stitch(
     """Lay clips one after another, and generate what leads from each to the next.
 
     The first clip stays where it is, and its skeleton and frame rate are those of
-    the result. Each following one is turned and placed so that it goes on where
-    the one before was heading; all of its frames are kept. Heights above the
-    floor stay as they are. Writes the clip and a report beside the first file:
-    walk.stitched.bvh and walk.stitched.json.
+    the result; what is of another rig is retargeted. Each following clip is turned
+    and placed so that it goes on where the one before was heading; all of its
+    frames are kept. Heights above the floor stay as they are. Writes the clip and a
+    report beside the first file: walk.stitched.bvh and walk.stitched.json.
 
     Try:
       interpose stitch walk.bvh run.bvh jump.bvh --player
@@ -94,6 +96,7 @@ def stitch(
     if not files:
         raise RequestError("no clips are named", "it takes two or more", "Write stitch walk.bvh run.bvh.")
     pieces = [_read(text, reading) for text in files]
+    pieces = [_fitted(piece, pieces[0].whole) for piece in pieces]
     first = pieces[0].file
     outputs = Outputs.choose(first, output, "stitched", player)
     for piece in pieces:
@@ -112,7 +115,9 @@ def stitch(
     _print_clips(pieces, done)
     say()
     print_report(done, done.clip.fps, {})
-    said = [f"note: {note}" for note in notes]
+    others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
+    rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
+    said = [f"note: {note}" for note in (*rigs, *notes)]
     say("\n".join([*_closing(done), "", *said, f"wrote {', '.join(map(str, outputs.all))}"]))
     return 0
 
@@ -132,9 +137,24 @@ def _read(text: str, reading: Reading) -> Piece:
     if not 0 <= span.start < span.stop <= len(whole):
         why = f"the clip has {len(whole)} frames, counted from 0"
         raise RequestError(f"there are no frames {part} in {name}", why, f"Choose some of 0:{len(whole)}.")
+    return Piece(Path(name), part, whole, _part(whole, part))
+
+
+def _part(whole: Clip, part: str) -> Clip:
+    """Some frames, with the file's layout."""
+    span = Gap.parse(part)
     chosen = slice(span.start, span.stop)
-    clip = whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
-    return Piece(Path(name), part, whole, clip)
+    return whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
+
+
+def _fitted(piece: Piece, first: Clip) -> Piece:
+    """The piece on the rig of the first file; all of a file tells more of its skeleton than a part does."""
+    from interpose.finish import on_rig_of
+
+    clip = on_rig_of(piece.whole, first) if len(piece.whole) and len(first) else piece.whole
+    if clip is piece.whole:
+        return piece
+    return replace(piece, clip=_part(clip, piece.part) if piece.part else clip, retargeted=True)
 
 
 def _lengths(text: str) -> str | list[int] | int:
@@ -159,6 +179,7 @@ def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:
             "frames": f"{laid.start}:{laid.stop}",
             **_placed(laid.placement),
             "scale": round(laid.scale, 4),
+            **({"retargeted": True} if piece.retargeted else {}),
             "gap_before": laid.why,
         }
         for piece, laid in zip(pieces, done.clips)

@@ -248,7 +248,7 @@ def plant(
         shift[..., 1] += (lift * np.prod(envelope(movable, over), axis=0))[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
-            rotation[moved] = _reach(
+            rotation[moved] = reach(
                 skeleton, leg, rotation[moved], turned[moved], placed[moved], grown * (feet + shift)[moved]
             )
     return clip.with_motion(rotation, clip.translation)
@@ -346,7 +346,7 @@ def _let_go(leg: Leg, placed: np.ndarray, shift: np.ndarray, over: float) -> np.
     return np.asarray(1.0 - np.minimum(spread(taut, over), 1.0))
 
 
-def _reach(
+def reach(
     skeleton: Skeleton,
     leg: Leg,
     rotation: np.ndarray,

@@ -20,7 +20,8 @@ class Part:
     """Local rotations of some joints over some frames of another clip.
 
     Attributes:
-        clip: the other clip; its skeleton has the joints under the same names and with the same rest pose.
+        clip: the other clip; its skeleton has the joints under the same names and with the same rest pose,
+            or it is brought onto the rig that does (`tasks.fill`).
         start, stop: its frames start to stop - 1.
         at: the frame of the completed clip at which they begin.
         joints: names.
@@ -73,13 +74,18 @@ def _check(clip: Clip, observation: Observation, part: Part) -> None:
             "joints of another clip can only be used where those of this one are missing",
             "Move them with --at, take fewer with --from-range, or make the gap longer.",
         )
-    for name in part.joints:
-        if _rests(clip, name, part.clip) > SAME:
-            raise RequestError(
-                f"{name} rests differently in the two clips",
-                "its rotations mean something else there",
-                "Use a clip of the same character.",
-            )
+    if odd := misfits(clip, part):
+        raise RequestError(
+            f"{odd[0]} rests differently in the two clips",
+            "its rotations mean something else there",
+            "Use a clip of the same character.",
+        )
+
+
+def misfits(clip: Clip, part: Part) -> list[str]:
+    """The joints of a part that the clip of it does not have, or that rest differently there."""
+    there = part.clip.skeleton.names
+    return [name for name in part.joints if name not in there or _rests(clip, name, part.clip) > SAME]
 
 
 def _rests(clip: Clip, name: str, other: Clip) -> float:

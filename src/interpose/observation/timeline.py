@@ -284,6 +284,15 @@ def _bare(skeleton: Skeleton) -> Skeleton:
     return replace(skeleton, names=names) if len({*names}) == len(names) and all(names) else skeleton
 
 
+def other_rig(clip: Clip, like: Clip) -> RequestError | None:
+    """Why `fit` cannot take a clip as it is, or None if it can."""
+    try:
+        _matched(clip, like)
+    except RequestError as error:
+        return error
+    return None
+
+
 def _matched(clip: Clip, like: Clip) -> list[int]:
     """For each joint of `like` the same one of `clip`; RequestError where they are not the same."""
     mine, other = (_bare(some.skeleton) for some in (like, clip))

@@ -168,6 +168,11 @@ class Humanoid:
         root = _hips_above(points / self.scale, turned[:, 0], self.bones)
         return canonical_positions(turned, root, self.bones) * self.hand
 
+    def root_over(self, points: np.ndarray, turned: np.ndarray) -> np.ndarray:
+        """(F, 3) metres: where hips turned by (F, 4) must be for thighs to hang where they do in canonical
+        points (F, 22, 3), right-handed."""
+        return _hips_above(points, turned, self.bones)
+
     def to_clip(self, canonical: np.ndarray, root: np.ndarray, like: Clip) -> Clip:
         """A clip of this skeleton from canonical rotations (F, 22, 4) and the place of the hips (F, 3).
 

@@ -1,0 +1,111 @@
+"""Motion on another skeleton: poses stay, ways go by the legs, feet stand where they stood."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import interpose
+from interpose.clip import Clip, Skeleton
+from interpose.errors import RequestError
+from interpose.finish import on_rig_of, retarget
+from interpose.geometry import rotations
+from interpose.observation.timeline import Placement
+from interpose.skeletons import JOINTS, find_humanoid, find_mapping
+from interpose.skeletons.carrier import carriers
+
+
+@pytest.fixture(scope="module")
+def hands() -> Clip:
+    """A walk of a rig with fingers: 65 joints, other names, bones and local axes than CMU's."""
+    return interpose.load(Path(interpose.__file__).parent / "examples" / "fingers.bvh")
+
+
+def test_there_and_back_it_is_the_same_motion(cmu_walk, hands):
+    there = retarget(cmu_walk, hands)
+    assert there.skeleton is hands.skeleton
+    assert len(there) == len(cmu_walk)
+    back = retarget(there, cmu_walk)
+    mapped = list(find_mapping(cmu_walk.skeleton).mapped[1])
+    away = np.linalg.norm(back.positions() - cmu_walk.positions(), axis=-1)[:, mapped]
+    assert away.mean() < 0.005
+
+
+def test_bodies_hold_themselves_alike_and_ankles_go_by_the_legs(cmu_walk, hands):
+    there = retarget(cmu_walk, hands)
+    one, two = find_humanoid(cmu_walk), find_humanoid(hands)
+    trunk = [JOINTS.index(name) for name in ("Hips", "Spine2", "LeftArm", "RightForeArm", "Head")]
+    apart = rotations.angle(one.rotations(cmu_walk)[:, trunk], two.rotations(there)[:, trunk])
+    assert np.degrees(apart).max() < 1e-4
+    ankles = [JOINTS.index("LeftFoot"), JOINTS.index("RightFoot")]
+    before, after = (
+        body.positions(clip)[:, ankles] * body.scale for body, clip in ((one, cmu_walk), (two, there))
+    )
+    off = np.abs(np.diff(after, axis=0) - np.diff(before, axis=0))
+    assert np.median(off) < 1e-4, "what stands, stands"
+    assert off.max() < 5e-3, "but for legs that are as good as straight"
+
+
+def test_the_floor_is_that_of_the_other_clip(cmu_walk, hands):
+    high = Placement(shift=(0.0, 0.5, 0.0)).of(hands, carriers(hands))
+    low, raised = retarget(cmu_walk, hands).positions(), retarget(cmu_walk, high).positions()
+    assert np.allclose(raised - low, [0.0, 0.5, 0.0], atol=1e-6)
+    mapped = list(find_mapping(hands.skeleton).mapped[1])
+    feet = [np.percentile(p[:, mapped, 1].min(axis=1), 10) for p in (low, hands.positions())]
+    assert feet[0] == pytest.approx(feet[1], abs=1e-6)
+
+
+def test_it_follows_turns_and_ways_of_the_motion(cmu_walk, hands):
+    moved = Placement(0.7, (1.0, 0.0, -2.0)).of(cmu_walk, carriers(cmu_walk))
+    ratio = find_mapping(hands.skeleton).leg_length / find_mapping(cmu_walk.skeleton).leg_length
+    placed = Placement(0.7, (ratio, 0.0, -2.0 * ratio)).of(retarget(cmu_walk, hands), carriers(hands))
+    assert np.allclose(retarget(moved, hands).positions(), placed.positions(), atol=1e-5)
+
+
+def test_fingers_keep_their_mean_pose(cmu_walk, hands):
+    there = retarget(cmu_walk, hands)
+    finger = hands.skeleton.index("mixamorig:LeftHandIndex2")
+    assert np.ptp(there.rotation[:, finger], axis=0).max() < 1e-12
+
+
+def test_a_root_goes_along_if_it_does_so_there(cmu_walk, hands):
+    """Game engines hang the hips from a root on the floor; with root motion it goes where the body goes."""
+    skeleton = hands.skeleton
+    parents = (-1, *(parent + 1 for parent in skeleton.parents))
+    rest = np.concatenate([np.zeros((1, 3)), skeleton.rest_translation])
+    rigged = Skeleton(("root", *skeleton.names), parents, rest)
+    hips = hands.positions()[:, 0]
+    floor = hips * [1.0, 0.0, 1.0]
+    rotation = np.concatenate([np.tile([1.0, 0, 0, 0], (len(hands), 1, 1)), hands.rotation], axis=1)
+    like = Clip(rigged, rotation, np.stack([floor, hips - floor], axis=1), hands.fps, (0, 1))
+    made = retarget(cmu_walk, like).positions()
+    assert np.abs((made[:, 0] - made[:, 1])[:, [0, 2]]).max() < 1e-3
+    assert np.ptp(made[:, 0], axis=0).max() > 1.0
+
+
+def test_clips_of_one_rig_stay_as_they_are(cmu_walk, data):
+    run = interpose.load(data / "cmu_run.bvh")
+    assert on_rig_of(run, cmu_walk) is run
+
+
+def test_what_is_no_humanoid_is_refused(cmu_walk):
+    chain = Skeleton(("a", "b", "c"), (-1, 0, 1), np.eye(3))
+    snake = Clip(chain, np.tile([1.0, 0, 0, 0], (4, 3, 1)), np.zeros((4, 1, 3)), 30.0, (0,))
+    with pytest.raises(RequestError, match="another skeleton"):
+        on_rig_of(snake, cmu_walk)
+    with pytest.raises(RequestError, match="no humanoid"):
+        retarget(snake, cmu_walk)
+
+
+def test_a_left_handed_rig_moves_as_well(cmu_walk, hands):
+    """Written with left-handed axes a body is its own mirror image."""
+    from interpose.skeletons.humanoid import reflect
+
+    mirrored = reflect(hands)
+    skeleton = replace(mirrored.skeleton, roles={"hand": "left"})
+    left = replace(mirrored, skeleton=skeleton)
+    there, right = retarget(cmu_walk, left), retarget(cmu_walk, hands)
+    assert np.allclose(there.positions() * [-1.0, 1.0, 1.0], right.positions(), atol=1e-6)
