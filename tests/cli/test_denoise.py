@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import pytest
+
 import interpose
 from interpose.evaluation.denoising import drop, tremble
 
@@ -73,3 +75,17 @@ def test_joints_at_the_ends_turn_without_moving(run, take):
     assert toe["moved_most"] == 0
     assert done["turned_most"] == toe["turned_most"] > toe["turned"] > 1
     assert "(LeftToeBase)" in run("denoise", take, "--joints", "LeftToeBase", "-o", "again.bvh").out
+
+
+@pytest.mark.parametrize("verb", ["denoise", "recover"])
+def test_a_dry_run_says_what_would_be_done_and_writes_nothing(run, take, verb):
+    joints = ["--joints", "LeftHand"]
+    before = sorted(path.name for path in take.parent.iterdir())
+    dry = run(verb, "take.bvh", *joints, "--dry-run", "--player")
+    assert dry.code == 0
+    assert "a dry run: nothing is written" in dry.out
+    assert run(verb, "take.bvh", "take.bvh", ".", *joints, "--dry-run", "-o", "made").code == 0
+    assert sorted(path.name for path in take.parent.iterdir()) == before
+    assert run(verb, "take.bvh", *joints, "--dry-run", "--json").json["dry_run"]
+    done = run(verb, "take.bvh", *joints, "--player")
+    assert done.out.splitlines()[:-1] == dry.out.splitlines()[:-1]

@@ -9,7 +9,7 @@ import shutil
 import numpy as np
 import pytest
 
-from interpose.formats import load
+from interpose.formats import load, save
 
 
 @pytest.fixture
@@ -107,3 +107,18 @@ def test_what_makes_no_sense_is_refused_in_three_lines(run, takes, options, says
     assert says in done.err
     assert not list(takes.glob("*.stitched.*"))
     assert (takes / "run.bvh").read_text() == text
+
+
+def test_what_jumped_is_put_where_the_body_was(run, takes):
+    """As `scan` advises: both halves of a clip, with open ends."""
+    walk = load(takes / "walk.bvh")
+    away = walk.translation.copy()
+    away[100:] += [1.5, 0.0, -0.7]
+    save(walk.with_motion(walk.rotation, away), takes / "jumps.bvh")
+    advice = next(line for line in run("scan", "jumps.bvh").out.splitlines() if "interpose stitch" in line)
+    words = [word.strip("'") for word in advice.split()[1:6]]
+    assert words == ["stitch", "jumps.bvh#:100", "jumps.bvh#100:", "--frames", "2"]
+    assert run(*words).code == 0
+    made = load(takes / "jumps.stitched.bvh")
+    assert len(made) == len(walk) + 2
+    assert np.linalg.norm(made.root[102] - walk.root[100]) < 0.1

@@ -32,8 +32,9 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
             raise _empty(file)
         folder: Path | None = options.get("output")
         if folder is not None and not folder.exists() and folder.suffix.lower() not in MOTION:
-            folder.mkdir(parents=True)
-        if folder is not None and not folder.is_dir():
+            if not options.get("dry_run"):
+                folder.mkdir(parents=True)
+        elif folder is not None and not folder.is_dir():
             raise RequestError(
                 "--output names one file",
                 f"{len(files)} files are to be written",

@@ -29,6 +29,7 @@ def denoise(
     seed: int | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     player: bool = False,
+    dry_run: bool = False,
     json: bool = False,
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
@@ -55,6 +56,7 @@ def denoise(
         seed: for methods that sample.
         output: where to write the clip; the report goes beside it. Of several clips a folder.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.
+        dry_run: say what is found and done, and write nothing.
         json: print the report as JSON.
         force: replace existing files, of .json files only reports.
     """
@@ -70,18 +72,20 @@ def denoise(
     clip = reading.load(file)
     part = range_of(frames, clip) if frames is not None else None
     outputs = Outputs.choose(file, output, "denoised", player)
-    outputs.check(file, force)
+    if not dry_run:
+        outputs.check(file, force)
     with progress(f"denoising {file.name}", len(clip)):
         done = tasks.denoise(
             clip, strength, chosen or None, (part.start, part.stop) if part else None, method, seed
         )
-    more = {"denoised": done.report.to_dict()["denoised"]}
+    more = {"dry_run": True} if dry_run else {}
+    more["denoised"] = done.report.to_dict()["denoised"]
     report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)
     report["units"] = UNITS
-    notes = write(outputs, force, clip, done, report)
+    notes = [] if dry_run else write(outputs, force, clip, done, report)
     if json:
         say_json(report)
     else:
         say("\n".join([*describe(file, clip), "", str(done.report), ""]))
-        say("\n".join([*(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, outputs.all))}"]))
+        say("\n".join([*(f"note: {note}" for note in notes), outputs.told(dry_run)]))
     return 0

@@ -221,7 +221,7 @@ def _dry_run(
         right=("gap", "frames", "length"),
     )
     say()
-    say(f"a dry run: nothing is written. Without --dry-run: {', '.join(map(str, outputs.all))}")
+    say(outputs.told(dry_run=True))
     try:
         outputs.check(file, force, gaps)
     except RequestError as error:

@@ -57,6 +57,11 @@ class Outputs:
     def all(self) -> list[Path]:
         return [path for path in (self.clip, self.report, self.page) if path is not None]
 
+    def told(self, dry_run: bool = False) -> str:
+        """What was written, or would be."""
+        names = ", ".join(map(str, self.all))
+        return f"a dry run: nothing is written. Without --dry-run: {names}" if dry_run else f"wrote {names}"
+
     def check(self, file: Path, force: bool, gaps: Path | None = None) -> None:
         """Before any work: RequestError if something is in the way.
 
@@ -193,18 +198,17 @@ def finish(
     json: bool,
     force: bool,
     more: dict[str, Any] | None = None,
+    dry_run: bool = False,
 ) -> int:
     """Write everything, print the report, and return the exit code: 4 when a gap stays open."""
     report = to_json(verb, file, outputs.clip, clip, completion, seed, why, more or {})
-    notes = write(outputs, force, clip, completion, report)
+    notes = [] if dry_run else write(outputs, force, clip, completion, report)
     if json:
         say_json(report)
     else:
         say("\n".join([*describe(file, clip), *([said] if said else []), ""]))
         print_report(completion, clip.fps, why)
-        say(
-            "\n".join(["", *(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, outputs.all))}"])
-        )
+        say("\n".join(["", *(f"note: {note}" for note in notes), outputs.told(dry_run)]))
     return 4 if completion.report.open else 0
 
 

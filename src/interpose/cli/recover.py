@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
@@ -31,6 +31,7 @@ def recover(
     license: str = "any",
     seed: int | None = None,
     player: bool = False,
+    dry_run: bool = False,
     json: bool = False,
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
@@ -63,6 +64,7 @@ def recover(
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (take.recovered.html) that plays the result; it opens in any browser.
+        dry_run: say what is found and done, and write nothing.
         json: print the report as JSON.
         force: replace existing files, of .json files only reports.
     """
@@ -85,7 +87,8 @@ def recover(
     for name in chosen or ():
         clip.skeleton.index(name)
     outputs = Outputs.choose(file, output, "recovered", player)
-    outputs.check(file, force)
+    if not dry_run:
+        outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance, place)
     looked = chosen is None and not place
@@ -102,12 +105,16 @@ def recover(
             4 if others else 0,
         )
     lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others]
-    more = {"left": f"{', '.join(lost)}, which `interpose fill` fills"} if others else {}
+    more: dict[str, Any] = {"dry_run": True} if dry_run else {}
+    more |= {"left": f"{', '.join(lost)}, which `interpose fill` fills"} if others else {}
     if stood := [f"{one.start}:{one.stop}" for one in done.report.gaps if STOOD in one.notes]:
         more["place"] = ", ".join(stood)
-    code = finish("recover", file, outputs, clip, done, seed, {}, json=json, force=force, more=more)
+    code = finish(
+        "recover", file, outputs, clip, done, seed, {}, json=json, force=force, more=more, dry_run=dry_run
+    )
     if others and not json:
         rest = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
         say(f"Missing, too, and left as it is: {', '.join(lost[:SHOWN])}{rest}")
-        say(f"interpose fill {quote(str(outputs.clip))} fills it; interpose scan lists all.")
+        next_ = quote(str(file if dry_run else outputs.clip))
+        say(f"interpose fill {next_} fills it; interpose scan lists all.")
     return code or (4 if others else 0)

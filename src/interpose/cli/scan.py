@@ -74,5 +74,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))
         gap = f"{max(first - room, 1)}:{min(first + room, len(clip) - 1)}"
         say(f"interpose fill {quote(str(file))} --gap {gap} leads over the first jump.")
+        if jumps[0].joints is None:
+            halves = " ".join(quote(f"{file}#{part}") for part in (f":{first}", f"{first}:"))
+            say(f"interpose stitch {halves} --frames 2 puts what follows where the body was.")
     if any(one.kind == "frozen position" for one in found) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")

@@ -76,7 +76,8 @@ def stitch(
       interpose stitch walk.bvh --loop
 
     Args:
-        files: FILE or FILE#START:STOP, frames START to STOP - 1 of it (.bvh, .npz, .amc).
+        files: FILE or FILE#START:STOP, frames START to STOP - 1 of it, or seconds (.bvh, .npz, .amc); without
+            START from the first frame on, without STOP to the last one.
         frames: how many frames to generate: one number, or one for each gap; auto chooses what is unhurried.
         align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
         loop: lead back to the beginning as well, so that the motion can be played round and round.
@@ -118,7 +119,7 @@ def stitch(
     others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
     rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
     said = [f"note: {note}" for note in (*rigs, *notes)]
-    say("\n".join([*_closing(done), "", *said, f"wrote {', '.join(map(str, outputs.all))}"]))
+    say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
 
 
@@ -130,7 +131,7 @@ def _read(text: str, reading: Reading) -> Piece:
         return Piece(Path(text), None, whole, whole)
     whole = reading.load(Path(name))
     try:
-        span = Gap.parse(part)
+        span = Gap.parse(part, clip=whole)
     except RequestError:
         fix = f"Write {name}#12:80 for the frames 12 to 79."
         raise RequestError(f"cannot read the part {part} of {name}", "a part is START:STOP", fix) from None
@@ -142,7 +143,7 @@ def _read(text: str, reading: Reading) -> Piece:
 
 def _part(whole: Clip, part: str) -> Clip:
     """Some frames, with the file's layout."""
-    span = Gap.parse(part)
+    span = Gap.parse(part, clip=whole)
     chosen = slice(span.start, span.stop)
     return whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
 
