@@ -24,6 +24,7 @@ from interpose.methods import registry, weights
 from interpose.observation import Gap, Observation, timeline
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
+from interpose.tasks import filling, windows
 
 METHODS = (*registry.names(), "auto")
 
@@ -75,7 +76,7 @@ def test_nothing_leaks(cmu_walk, method):
 def test_a_gap_of_a_long_clip_is_the_gap_of_its_window(long_walk):
     """The window holds all that counts, but for the clip's own acceleration, which limits the seams."""
     gap = Gap(600, 630)
-    margin = round(tasks.CONTEXT * long_walk.fps)
+    margin = round(windows.CONTEXT * long_walk.fps)
     lo, hi = gap.start - margin, gap.stop + margin
     whole = tasks.fill(long_walk, [gap], "cae").clip
     alone = tasks.fill(long_walk.slice(lo, hi), [Gap(margin, margin + 30)], "cae").clip
@@ -91,13 +92,13 @@ def test_gaps_do_not_depend_on_each_other_s_filling(long_walk):
 
 def test_near_gaps_are_completed_at_once(cmu_walk, monkeypatch):
     """Else each would complete all of its neighbours once more: keys on fives take 20 times as long."""
-    asked, real = [], tasks.complete
+    asked, real = [], complete
 
     def counted(*args, **options):  # type: ignore[no-untyped-def]
         asked.append(real(*args, **options))
         return asked[-1]
 
-    monkeypatch.setattr(tasks, "complete", counted)
+    monkeypatch.setattr(filling, "complete", counted)
     gaps = [Gap(frame + 1, frame + 5) for frame in range(0, 200, 5)]
     done = tasks.fill(cmu_walk, gaps, "linear", methods={7: "spline"})
     assert sum(len(one.report.gaps) for one in asked) < 3 * len(gaps)
@@ -271,7 +272,7 @@ def test_joints_lost_for_long_are_recovered_in_pieces_that_agree(long_walk):
     arm = long_walk.skeleton.index("LeftHand")
     hand = done.clip.positions()[:, arm]
     speed = np.linalg.norm(np.diff(hand, axis=0), axis=-1)
-    seams = [round(tasks.PIECE * 30) - k for k in range(round(tasks.OVERLAP * 30) + 2)]
+    seams = [round(windows.PIECE * 30) - k for k in range(round(windows.OVERLAP * 30) + 2)]
     assert speed[seams].max() < 3 * np.percentile(speed, 99)
     legs = [j for j, name in enumerate(long_walk.skeleton.names) if "Leg" in name]
     assert np.array_equal(done.clip.rotation[:, legs], long_walk.rotation[:, legs])
@@ -523,7 +524,7 @@ def test_reports_of_pieces_are_joined_whole():
     """The worst of what must not be, means of what is a mean, and what only the second piece has."""
     first = GapReport(0, 100, ("Head",), "small", 1, penetration=1.0, expected=2.0)
     second = replace(first, start=90, stop=140, penetration=9.0, pins=3.0, expected=6.0)
-    (joined,) = tasks._joined([first, second])
+    (joined,) = windows.joined([first, second])
     assert (joined.start, joined.stop, joined.penetration, joined.pins) == (0, 140, 9.0, 3.0)
     assert 2.0 < joined.expected < 6.0
 

@@ -1,0 +1,23 @@
+"""What the verbs mean: say what is observed, choose a method for each gap, complete, and report."""
+
+from interpose.tasks.filling import fill, fitted
+from interpose.tasks.forecasting import Forecast, forecast
+from interpose.tasks.keys import between, block
+from interpose.tasks.planning import plan
+from interpose.tasks.recovering import denoise, recover
+from interpose.tasks.stitching import BESIDE, Stitched, stitch
+
+__all__ = [
+    "BESIDE",
+    "Forecast",
+    "Stitched",
+    "between",
+    "block",
+    "denoise",
+    "fill",
+    "fitted",
+    "forecast",
+    "plan",
+    "recover",
+    "stitch",
+]

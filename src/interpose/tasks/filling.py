@@ -1,0 +1,146 @@
+"""Fill what is missing: choose a method for each gap, complete each in a window of its own, report."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import Completion, GapReport, Report, complete, on_rig_of, seams
+from interpose.finish.path import spans
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation, Part, Pin
+from interpose.observation.part import lay, misfits
+from interpose.skeletons import find_humanoid
+from interpose.tasks.moments import mended, momentary, with_moments
+from interpose.tasks.planning import plan
+from interpose.tasks.windows import CONTEXT, OVERLAP, joined, paste, put_together, shifted, together
+
+
+def fill(
+    clip: Clip,
+    gaps: Sequence[Gap] | Observation,
+    method: str = "auto",
+    max_gap: int | None = None,
+    only: Sequence[int] | None = None,
+    seed: int | None = None,
+    methods: Mapping[int, str] | None = None,
+    progress: Callable[[float], None] | None = None,
+    action: str = "",
+    parts: Sequence[Part] = (),
+    path: Mapping[int, Any] | None = None,
+    pins: Sequence[Pin] = (),
+    temperature: float = 1.0,
+    zero: int = 0,
+) -> Completion:
+    """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
+
+    Args:
+        clip: F frames; its values inside the gaps have no influence.
+        gaps: what is missing, or an observation that says for every value whether it is known. Gaps that
+            touch or overlap count as one.
+        method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length:
+            values that an observation misses for moments it interpolates one by one.
+        max_gap: frames; longer gaps stay open.
+        only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
+        seed: for methods that sample.
+        methods: the method of single gaps by number, in place of `method`.
+        progress: called with the share done, 0 to 1.
+        action: what the motion in the gaps is, for methods that know actions; "auto" then is one of them.
+        parts: poses of single joints that other clips give inside of the gaps; of other rigs they are brought
+            onto this one's first.
+        path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
+        pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
+        temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
+        zero: the frame that notes call 0.
+
+    Returns:
+        The completion; `report.open` lists the gaps left open.
+
+    Raises:
+        RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
+            observed; a part that does not fit; a path, or a pin, outside of the gaps.
+    """
+    observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
+    observation.check(clip)
+    if seed is not None and seed < 0:
+        raise RequestError(f"cannot take the seed {seed}", "it is a number from 0 on", "Write --seed 1.")
+    observation = replace(observation, pins=(*observation.pins, *pins))
+    clip, observation = lay(clip, observation, fitted(parts, clip))
+    piecemeal = isinstance(gaps, Observation) and not observation.pins
+    brief = momentary(clip, observation) if piecemeal else None
+    if brief and method in ("auto", "spline"):
+        laid, seen = mended(clip, observation, brief)
+        rest = fill(
+            laid, seen, method, max_gap, only, seed, methods, progress, action, (), path, (), temperature
+        )
+        return with_moments(rest, clip, brief)
+    if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
+        raise RequestError(
+            "there is nothing to go by",
+            "no value of the clip is observed, so any motion would do",
+            "Leave at least one frame out of the gaps.",
+        )
+    whole, clip = clip, _handed(clip, observation)
+    spans(clip, observation, path or ())
+    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
+    for frame in path or {}:
+        if any(job.method is None and job.gap.start <= frame < job.gap.stop for job in jobs):
+            raise RequestError(
+                f"the path leads through a gap that stays open: frame {frame}",
+                "the gap is longer than allowed, or not among the gaps chosen",
+                "Leave the point out, or let the gap be filled.",
+            )
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    provenance = np.zeros(rotation.shape[:2], np.int8)
+    said: list[tuple[int, slice, Raw]] = []
+    reports: list[GapReport] = []
+    limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
+    work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
+    for done, (group, chosen) in enumerate(work):
+        margin = round(CONTEXT * clip.fps)
+        lo, hi = max(0, group.pieces[0].start - margin), min(len(clip), group.pieces[-1].stop + margin)
+        pieces = [piece for piece in group.pieces if piece.job.method == chosen]
+        led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
+        way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if f in led}
+        # The file tells what its joints can do, and is not what the window is written to.
+        window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
+        part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo - zero)
+        for job, start, stop in pieces:
+            fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
+            inside = slice(start - lo, stop - lo)
+            paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
+            known = observation.translation[:, list(clip.translated)]
+            paste(translation, part.clip.translation, known, start, inside, fade)
+            provenance[start:stop] = part.provenance[inside]
+            said.append((start, inside, part.raw))
+            reports += shifted(part.report.gaps, lo, start, stop, job)
+        if progress:
+            progress((done + 1) / len(work))
+    reports.sort(key=lambda gap: (gap.number, gap.start))
+    reports = joined(reports)
+    left = [job.gap for job in jobs if job.method is None]
+    report = Report(method, reports, left, action)
+    return Completion(
+        whole.with_motion(rotation, translation), lambda: put_together(whole, said), provenance, report
+    )
+
+
+def fitted(parts: Iterable[Part], clip: Clip) -> list[Part]:
+    """Parts on the skeleton of a clip, whatever rig they are of."""
+    return [replace(part, clip=on_rig_of(part.clip, clip)) if misfits(clip, part) else part for part in parts]
+
+
+def _handed(clip: Clip, observation: Observation) -> Clip:
+    """The clip with its handedness said, from all that is observed of it: single gaps must not decide."""
+    frames = np.flatnonzero(observation.frames)
+    if "hand" in clip.skeleton.roles or not frames.size:
+        return clip
+    frames = frames[:: max(1, frames.size // 200)]
+    body = find_humanoid(clip.with_motion(clip.rotation[frames], clip.translation[frames]))
+    roles = {**clip.skeleton.roles, "hand": "left" if body.left_handed else "right"}
+    return replace(clip, skeleton=replace(clip.skeleton, roles=roles))

@@ -1,0 +1,108 @@
+"""How a clip goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import Completion
+from interpose.methods import registry
+from interpose.methods.protocol import Sampler
+from interpose.observation import Gap, Observation, timeline
+from interpose.tasks.filling import fill
+from interpose.tasks.planning import plan
+
+AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
+HOTTEST = 10.0  # times the noise of the training that may be injected
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast(Completion):
+    """A clip and what follows, and other ways in which it may go on.
+
+    Attributes:
+        start: the first frame that was not there.
+        samples: all of them, this one first.
+    """
+
+    start: int
+    samples: list[Completion]
+
+    def spread(self) -> np.ndarray:
+        """(frames,) cm by which joints of the samples lie from their mean, in the mean, in each new frame."""
+        positions = np.stack([one.clip.slice(self.start, len(one.clip)).positions() for one in self.samples])
+        off = np.linalg.norm(positions - positions.mean(axis=0), axis=-1)
+        return np.asarray(100 * np.sqrt(np.square(off).mean(axis=(0, 2))))
+
+
+def forecast(
+    clip: Clip,
+    frames: int | None = None,
+    samples: int = 1,
+    method: str = "auto",
+    seed: int | None = None,
+    temperature: float = 1.0,
+    progress: Callable[[float], None] | None = None,
+) -> Forecast:
+    """Go on with a clip, from its last pose and where that is.
+
+    Args:
+        clip: what is known; it comes back unchanged.
+        frames: how many are added; 2 s without it.
+        samples: in how many ways; seeds are counted up from `seed`, or from 1.
+        method: a method, or "auto".
+        seed: of the noise that is injected; a single sample without any is the most likely one.
+        temperature: how much of it; 1 is what the method was trained with.
+        progress: called with the share done, 0 to 1.
+
+    Raises:
+        RequestError: nothing to go on from, no frame or no sample asked for, a temperature that the method
+            does not have, and what `fill` refuses.
+    """
+    frames = round(AHEAD * clip.fps) if frames is None else frames
+    for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
+        if not isinstance(count, int | np.integer) or count < 1:
+            raise RequestError(
+                f"cannot forecast {count} {what}s",
+                "it is a whole number from 1 on",
+                f"Write for example {fix}.",
+            )
+    timeline.bounded(frames, clip.fps)
+    if not 0 <= temperature <= HOTTEST:
+        raise RequestError(
+            f"cannot sample at temperature {temperature:g}",
+            "the noise is multiplied with it",
+            f"Choose 0 to {HOTTEST:g}: 1 is what the network was trained with.",
+        )
+    if not len(clip):
+        raise RequestError("there is nothing to go on from", "the clip has no frame", "Name another clip.")
+    held = np.minimum(np.arange(len(clip) + frames), len(clip) - 1)
+    longer = clip.with_motion(clip.rotation[held], clip.translation[held])
+    gap = Gap(len(clip), len(longer))
+    job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
+    chosen = job.method.name if method == "auto" and job.method else method
+    if samples > 1 and job.method and (why := job.method.refuses(longer, gap)):
+        raise RequestError(
+            f"cannot draw {samples} samples",
+            f"{chosen} refuses: {why}",
+            "Ask for one, or give it more to see.",
+        )
+    if samples > 1 and not isinstance(registry.get(chosen), Sampler):
+        raise registry.one_answer(f"cannot draw {samples} samples with {chosen}")
+    seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]
+
+    def part(i: int) -> Callable[[float], None] | None:
+        return (lambda share: progress((i + share) / samples)) if progress else None
+
+    done = [
+        fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
+        for i, drawn in enumerate(seeds)
+    ]
+    first = done[0]
+    made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
+    made.samples.extend([made, *done[1:]])
+    return made

@@ -1,0 +1,95 @@
+"""The motion between key poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import Completion
+from interpose.observation import Gap
+from interpose.tasks.filling import fill
+from interpose.tasks.windows import raw_part
+
+
+def between(
+    clip: Clip,
+    keys: Sequence[int],
+    action: str = "",
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    cut: bool = False,
+) -> Completion:
+    """Generate all that lies between key frames of a clip; the keys come back unchanged.
+
+    Args:
+        clip: its poses between the keys have no influence; what lies before the first and after the last key
+            stays as it is.
+        keys: frame numbers, two or more, in any order.
+        action: what the motion is, for methods that know actions.
+        method, seed, progress: as in `fill`.
+        cut: give back what lies from the first key to the last alone.
+
+    Raises:
+        RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
+    """
+    chosen = sorted(set(keys))
+    if bad := [key for key in chosen if key != int(key) or not 0 <= key < len(clip)]:
+        raise RequestError(
+            f"there is no frame {bad[0]}",
+            f"the clip has {len(clip)} frames, counted from 0",
+            f"Choose keys from 0 to {len(clip) - 1}.",
+        )
+    gaps = [Gap(a + 1, b) for a, b in zip(chosen, chosen[1:]) if b > a + 1]
+    if not gaps:
+        raise RequestError(
+            "there is nothing between the keys",
+            f"the keys are {', '.join(map(str, chosen)) or 'none'}",
+            "Name some that are apart: 0,30,75. Of a file of poses: --start a.bvh#0 --target a.bvh#1.",
+        )
+    zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
+    done = fill(clip, gaps, method, seed=seed, progress=progress, action=action, zero=zero)
+    return _part(done, zero, stop) if cut else done
+
+
+def _part(done: Completion, start: int, stop: int) -> Completion:
+    """The frames start to stop - 1 of a completion, all of its gaps among them."""
+    reports = [replace(gap, start=gap.start - start, stop=gap.stop - start) for gap in done.report.gaps]
+    clip, part = done.clip, slice(start, stop)
+    return Completion(
+        clip.with_motion(clip.rotation[part], clip.translation[part]),
+        lambda: raw_part(done.raw, start, stop),
+        done.provenance[part],
+        replace(done.report, gaps=reports),
+    )
+
+
+def block(poses: Mapping[int, Clip]) -> Clip:
+    """A clip from poses by frame: the key frames that `between` goes by. Each pose holds until the next.
+
+    Args:
+        poses: clips of one frame on skeletons with the same joints, frame 0 among them: its skeleton, frame
+            rate and file layout are the result's.
+
+    Raises:
+        RequestError: the skeletons differ.
+    """
+    first = poses[0]
+    for frame, pose in poses.items():
+        if pose.skeleton.names != first.skeleton.names or pose.translated != first.translated:
+            odd = sorted({*pose.skeleton.names} ^ {*first.skeleton.names})
+            raise RequestError(
+                f"the pose at frame {frame} is on another skeleton than the first",
+                f"joints that only one of them has: {', '.join(odd[:6])}" if odd else "joints differ in kind",
+                "Use poses of one character.",
+            )
+    held = np.repeat(sorted(poses), np.diff([*sorted(poses), max(poses) + 1]))
+    rotation, translation = (
+        np.concatenate([getattr(poses[frame], name) for frame in held])
+        for name in ("rotation", "translation")
+    )
+    return first.with_motion(rotation, translation)

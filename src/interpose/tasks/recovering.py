@@ -1,0 +1,145 @@
+"""Joints that are lost, named or found; and noise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import Completion, Provenance
+from interpose.finish.denoise import denoised
+from interpose.finish.feet import legs
+from interpose.finish.report import JointMoments
+from interpose.methods import registry
+from interpose.observation import Gap, Observation
+from interpose.observation.broken import broken
+from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
+from interpose.observation.scan import strays, stuck
+from interpose.skeletons.carrier import placed
+from interpose.tasks.filling import fill
+
+STRONGEST = 100.0  # how many times the estimated noise may be assumed
+
+
+def recover(
+    clip: Clip,
+    joints: Sequence[str] | None = None,
+    frames: tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    place: bool = False,
+) -> Completion:
+    """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
+
+    Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose or
+    jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
+    whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn. `place`
+    says that this is all that is lost: where the body is, but for the first frame of a whole clip. Feet that
+    stand tell it. Other arguments, result and errors are those of `fill`.
+    """
+    start, stop = frames or (0, len(clip))
+    if frames is not None:
+        Gap(start, stop).check(len(clip))
+    if place:
+        if joints is not None:
+            raise RequestError(
+                "joints and the place of the body cannot be recovered at once",
+                "feet tell the place only where all turns are known",
+                "Recover the joints first, and then the place.",
+            )
+        if not legs(clip.skeleton):
+            raise RequestError(
+                "the place of the body cannot be recovered",
+                "what it stands on tells it, and no legs were found",
+                "Name them: --map, or load(..., roles=...).",
+            )
+        seen = Observation.full(clip)
+        seen.translation[start:stop, placed(clip)[-1:]] = False
+        if (start, stop) == (0, len(clip)):
+            # The first frame counts that belongs to the motion.
+            seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
+        return fill(clip, seen, method, seed=seed, progress=progress)
+    if joints is None:
+        swapped = _swapped(clip, start, stop)
+        sides = put_back(clip, swapped)
+        done = fill(sides, _by_itself(sides, start, stop), method, seed=seed, progress=progress)
+        return _with_sides(done, swapped)
+    return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def denoise(
+    clip: Clip,
+    strength: float = 1.0,
+    joints: Sequence[str] | None = None,
+    frames: tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
+) -> Completion:
+    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
+
+    Args:
+        clip: what is observed but not fully trusted.
+        strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
+        joints: the joints that may turn, roots among them that move, too; None for all.
+        frames: the range in which anything may change, from which the noise is estimated, too.
+        method: what fills values that were lost; "auto" interpolates, which is best for moments.
+        seed: for methods that sample.
+
+    Raises:
+        RequestError: too few frames, a strength below 0 or above 100, a joint or range that does not exist.
+    """
+    if not 0 <= strength <= STRONGEST:
+        raise RequestError(
+            f"cannot denoise with strength {strength:g}",
+            "the estimated noise is multiplied with it",
+            f"Choose 0 to {STRONGEST:g}: 1 trusts the estimate, 2 smooths more.",
+        )
+    start, stop = frames or (0, len(clip))
+    if frames is not None:
+        Gap(start, stop).check(len(clip))
+    chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
+    swapped = _swapped(clip, start, stop) if chosen is None and strength else []
+    sides = put_back(clip, swapped)
+    if method == "auto":
+        return _with_sides(denoised(sides, strength, chosen, start, stop), swapped)
+    registry.get(method)
+    done = denoised(
+        sides, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
+    )
+    return _with_sides(done, swapped)
+
+
+def _swapped(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
+    """What was taken for something else within the frames start to stop - 1."""
+    return [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+
+
+def _with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
+    """A completion that also tells what was on the wrong side, and was put back."""
+    if not swapped:
+        return done
+    provenance, frames = done.provenance.copy(), dict[int, list[str]]()
+    for one in swapped:
+        provenance[one.start : one.stop, one.joints] = Provenance.CORRECTED
+        for joint in one.joints:
+            frames.setdefault(joint, []).append(f"{one.start}:{one.stop}")
+    told = tuple(JointMoments(done.clip.skeleton.names[j], tuple(at)) for j, at in sorted(frames.items()))
+    return replace(done, provenance=provenance, report=replace(done.report, exchanged=told))
+
+
+def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
+    """What is left of a clip without what was lost in frames start to stop - 1: what `recover` finds."""
+    seen, odd = broken(clip), strays(clip)
+    seen.rotation[odd], seen.translation[odd] = True, True
+    for one in stuck(clip):
+        held = [clip.skeleton.index(name) for name in one.joints or ()]
+        # A rest pose beside the frames in which a body is stuck does not tell where it is either.
+        beside = [frame for frame in odd if one.start - 1 <= frame <= one.stop]
+        seen.translation[np.ix_([*range(one.start, one.stop), *beside], held)] = False
+    seen.rotation[:start], seen.translation[:start] = True, True
+    seen.rotation[stop:], seen.translation[stop:] = True, True
+    return seen

@@ -1,0 +1,116 @@
+"""Clips one after another, and what leads from each to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from interpose.clip import Clip
+from interpose.finish import Completion, on_rig_of
+from interpose.finish.measures import acceleration
+from interpose.observation import timeline
+from interpose.tasks.filling import fill
+from interpose.tasks.windows import raw_part
+
+# Seconds by which a transition may be longer than it has to be, where feet slide less so; seconds of motion
+# on either side with which that is tried; metres that feet have to travel in it; and the slide (cm/s) that
+# counts as much as gliding all along.
+TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
+
+
+@dataclass(frozen=True)
+class Loop:
+    """How a motion that goes round meets its beginning.
+
+    Attributes:
+        placement: how the whole motion is turned and shifted each time it comes round.
+        why: what decided the length of the last gap, where nobody said it.
+        jump, limit: cm a frame squared, the largest velocity jump of any joint at frame 0, so placed, after
+            the last two frames; and the 95th percentile of the motion's own.
+    """
+
+    placement: timeline.Placement
+    why: str
+    jump: float | None
+    limit: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Stitched(Completion):
+    """A completion that tells where each clip lies on the timeline, and of a loop how it closes."""
+
+    clips: list[timeline.Laid]
+    loop: Loop | None = None
+
+
+def stitch(
+    clips: Sequence[Clip],
+    frames: str | int | Sequence[int] = "auto",
+    align: bool = True,
+    loop: bool = False,
+    action: str = "",
+    method: str = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Stitched:
+    """Lay clips one after another on one timeline, and generate the motion that leads from each to the next.
+
+    All frames of the clips are kept; following ones are placed as a whole (`timeline.lay`). Of a loop the
+    beginning is laid at the end once more, as what the last gap leads to, and then taken away again.
+
+    Args:
+        clips, frames, align, loop: as in `timeline.lay`; the motion of what is on another rig than the first
+            clip is brought onto that one's skeleton first (`retarget`).
+        action, method, seed, progress: as in `fill`.
+
+    Raises:
+        RequestError: what `on_rig_of`, `timeline.lay` and `fill` refuse.
+    """
+    clips = [on_rig_of(clip, clips[0]) if len(clip) else clip for clip in clips]
+    line = timeline.lay(clips, frames, align, loop)
+    if frames == "auto" and align:
+        lengths, whys = _tried(line, method, action, seed)
+        line = timeline.lay(clips, lengths, align, loop).because(whys)
+    done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
+    clip, provenance, closing = done.clip, done.provenance, None
+    if line.again is not None:
+        start, last = line.again.start, done.report.gaps[-1]
+        around = acceleration(clip.slice(start - 1, start + 2).positions())
+        jump = 100 * float(around.max()) if around.size else None
+        closing = Loop(line.again.placement, line.again.why, jump, last.seam_limit)
+        clip = clip.with_motion(clip.rotation[:start], clip.translation[:start])
+        provenance = provenance[:start]
+    return Stitched(
+        clip,
+        lambda: raw_part(done.raw, 0, len(clip)),
+        provenance,
+        done.report,
+        clips=line.laid,
+        loop=closing,
+    )
+
+
+def _tried(
+    line: timeline.Timeline, method: str, action: str, seed: int | None
+) -> tuple[list[int], list[str]]:
+    """How long each gap should be, and why: where strides do not tell it, as long as feet slide least with
+    the motion beside it, from its length on up to TRIED more."""
+    lengths, whys, fps = [], [], line.clip.fps
+    for way, gap in zip(line.ways, line.gaps):
+        near, slides = round(BESIDE * fps) + 1, {}
+        ends = (
+            line.clip.slice(max(0, gap.start - near), gap.start),
+            line.clip.slice(gap.stop, gap.stop + near),
+        )
+        for length in range(len(gap), len(gap) + round(TRIED * fps) + 1, max(1, round(fps / 10))):
+            if way.in_step:
+                break
+            pair = timeline.lay(ends, length)
+            (report,) = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps
+            if report.foot_slide is None or (report.foot_travel or 0.0) < TRAVELS:
+                break
+            slides[length] = report.foot_slide + GLIDING * (report.gliding or 0.0)
+        lengths.append(min(slides, key=lambda length: slides[length], default=len(gap)))
+        least = f"feet slide least, of {len(slides)} lengths tried (the shortest: {way.why})"
+        whys.append(least if lengths[-1] > len(gap) else way.why)
+    return lengths, whys
