@@ -1,0 +1,87 @@
+"""One motion on the skeletons of four rigs.
+
+    python examples/rigs.py --data data --out docs/pictures
+
+A jump of a CMU test performer (mocap.cs.cmu.edu), and the same on a rig with fingers, on LAFAN1's and on
+Bandai-Namco's (`interpose convert jump.bvh mine.bvh --onto rig.bvh`). What is printed says how far ankles go
+in a second that stand (slower than 5 cm a second), and how far the motion is off once it is put back.
+"""
+
+from __future__ import annotations
+
+import argparse
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+import interpose
+from interpose.geometry.time import resample
+from interpose.show import Take, strip
+from interpose.show.sheet import sheet
+from interpose.skeletons import JOINTS, find_humanoid, find_mapping
+
+TRIAL, SHOWN = "49/49_02.bvh", (30, 120)
+RIGS = {
+    "with fingers": resources.files("interpose") / "examples" / "fingers.bvh",
+    "LAFAN1": "lafan1/bvh/walk3_subject5.bvh",
+    "Bandai-Namco": "bandai/Bandai-Namco-Research-Motiondataset-1/data/dataset-1_walk_normal_001.bvh",
+}
+ANKLES = [JOINTS.index("LeftFoot"), JOINTS.index("RightFoot")]
+STANDS = 0.05  # metres a second
+
+
+def speeds(clip: interpose.Clip) -> np.ndarray:
+    """(F - 1, 2) metres a second of the ankles, of a body with the canonical leg."""
+    body = find_humanoid(clip)
+    places = body.positions(clip)[:, ANKLES] * body.scale
+    return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=-1) * clip.fps)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--data", type=Path, required=True, help="the folder that holds cmu/, lafan1/, bandai/"
+    )
+    parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    given = parser.parse_args()
+    clip = interpose.load(given.data / "cmu" / "bvh" / TRIAL)
+    clip = resample(clip.slice(1, len(clip)), 30)
+    stands = speeds(clip) < STANDS
+    mapped = list(find_mapping(clip.skeleton).mapped[1])
+    made = {"CMU": clip}
+    print(f"CMU: {100 * speeds(clip)[stands].mean():.1f} cm/s")
+    for name, file in RIGS.items():
+        made[name] = interpose.retarget(clip, interpose.load(Path(str(given.data / str(file)))))
+        back = interpose.retarget(made[name], clip).positions() - clip.positions()
+        off = 100 * np.linalg.norm(back, axis=-1)[:, mapped].mean()
+        print(f"{name}: {100 * speeds(made[name])[stands].mean():.1f} cm/s, {off:.1f} cm off once it is back")
+    strips = [
+        strip(
+            [Take(name, one.positions()[:, list(find_mapping(one.skeleton).mapped[1])], color)],
+            parents(one),
+            one.fps,
+            [interpose.Gap(0, len(one))],
+            title="CMU 49_02"
+            if one is clip
+            else f"on the rig {name}"
+            if " " in name
+            else f"on the rig of {name}",
+            count=10,
+            span=SHOWN,
+        )
+        for (name, one), color in zip(made.items(), ("#6b7280", *["#d1495b"] * len(RIGS)))
+    ]
+    sheet(strips, given.out / "rigs.svg")
+    print(f"wrote {given.out / 'rigs.svg'}")
+
+
+def parents(clip: interpose.Clip) -> list[int]:
+    """Of the mapped joints, the next mapped one above each."""
+    mapped = list(find_mapping(clip.skeleton).mapped[1])
+    above = [[joint for joint in clip.skeleton.ancestors(one) if joint in mapped] for one in mapped]
+    return [mapped.index(line[0]) if line else -1 for line in above]
+
+
+if __name__ == "__main__":
+    main()
