@@ -3,7 +3,7 @@
     python examples/rigs.py --data data --out docs/pictures
 
 A jump of a CMU test performer (mocap.cs.cmu.edu), and the same on a rig with fingers, on LAFAN1's and on
-Bandai-Namco's (`interpose convert jump.bvh mine.bvh --onto rig.bvh`). What is printed says how far ankles go
+Bandai-Namco's (`interpose convert jump.bvh mine.bvh --onto rig.bvh`). What is printed says how far toes go
 in a second that stand (slower than 5 cm a second), and how far the motion is off once it is put back.
 """
 
@@ -27,14 +27,14 @@ RIGS = {
     "LAFAN1": "lafan1/bvh/walk3_subject5.bvh",
     "Bandai-Namco": "bandai/Bandai-Namco-Research-Motiondataset-1/data/dataset-1_walk_normal_001.bvh",
 }
-ANKLES = [JOINTS.index("LeftFoot"), JOINTS.index("RightFoot")]
+TOES = [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]
 STANDS = 0.05  # metres a second
 
 
 def speeds(clip: interpose.Clip) -> np.ndarray:
-    """(F - 1, 2) metres a second of the ankles, of a body with the canonical leg."""
+    """(F - 1, 2) metres a second of the toes, of a body with the canonical leg."""
     body = find_humanoid(clip)
-    places = body.positions(clip)[:, ANKLES] * body.scale
+    places = body.positions(clip)[:, TOES] * body.scale
     return np.asarray(np.linalg.norm(np.diff(places, axis=0), axis=-1) * clip.fps)
 
 

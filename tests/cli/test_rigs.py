@@ -37,7 +37,8 @@ def test_stitch_takes_what_is_of_another_rig(run, rigs):
 def test_convert_puts_a_motion_onto_a_rig(run, rigs):
     done = run("convert", "walk.bvh", "mine.bvh", "--onto", "hands.bvh", "--fps", "60")
     assert done.code == 0
-    assert "as in hands, in the mean" in done.out
+    assert "43 joints keep their mean pose in hands" in done.out
+    assert "hands.bvh: 163 frames" in done.out, "how the rig was understood, too"
     made, walk = load(rigs / "mine.bvh"), load(rigs / "walk.bvh")
     assert made.skeleton.names == load(rigs / "hands.bvh").skeleton.names
     assert made.fps == pytest.approx(60)
@@ -56,14 +57,18 @@ def test_convert_onto_the_same_rig_keeps_every_rotation(run, rigs, data):
 def test_between_meets_a_pose_of_another_rig(run, rigs):
     done = run("between", "--start", "walk.bvh#60", "--target", "hands.bvh#100", "--frames", "30")
     assert done.code == 0
-    assert "hands.bvh#100 is on another rig" in done.out
+    assert "hands.bvh is on another rig" in done.out
+    assert json.loads((rigs / "walk.between.json").read_text())["retargeted"] == ["hands.bvh"]
     made = load(rigs / "walk.between.bvh")
     assert made.skeleton.names == load(rigs / "walk.bvh").skeleton.names
 
 
 def test_an_arm_of_another_rig_is_laid_over_the_motion(run, rigs):
     arm = ["--from", "hands.bvh", "--from-range", "60:90", "--at", "80", "--joints", "LeftArm,LeftForeArm"]
-    assert run("fill", "walk.bvh", "--layer", *arm, "-o", "waves.bvh").code == 0
+    done = run("fill", "walk.bvh", "--layer", *arm, "-o", "waves.bvh")
+    assert done.code == 0
+    assert "hands.bvh is on another rig" in done.out
+    assert json.loads((rigs / "waves.json").read_text())["parts"][0]["retargeted"]
     made, there = load(rigs / "waves.bvh"), interpose.retarget(rigs / "hands.bvh", rigs / "walk.bvh")
     joints = [made.skeleton.index(name) for name in ("LeftArm", "LeftForeArm")]
     chord = np.abs((made.rotation[80:110, joints] * there.rotation[60:90, joints]).sum(-1))
@@ -85,3 +90,80 @@ def test_what_is_no_humanoid_is_refused(run, rigs):
     assert "another skeleton" in done.err
     assert run("convert", "walk.bvh", "x.bvh", "--onto", "snake.bvh").code == 2
     assert not (rigs / "x.bvh").exists()
+
+
+def test_an_arm_at_another_rate_is_laid_in_as_long_as_it_took(run, rigs):
+    run("convert", "hands.bvh", "fast.bvh", "--fps", "60")
+    arm = ["--from", "fast.bvh", "--from-range", "120:181", "--at", "80", "--joints", "LeftArm,LeftForeArm"]
+    assert run("fill", "walk.bvh", "--layer", *arm, "-o", "waves.bvh").code == 0
+    made, there = load(rigs / "waves.bvh"), interpose.retarget(rigs / "hands.bvh", rigs / "walk.bvh")
+    joints = [made.skeleton.index(name) for name in ("LeftArm", "LeftForeArm")]
+    chord = np.abs((made.rotation[80:110, joints] * there.rotation[60:90, joints]).sum(-1))
+    assert chord.min() > 1 - 1e-4
+
+
+def test_what_another_rig_does_not_have_it_cannot_give(run, rigs):
+    finger = "mixamorig:LeftHandIndex1"
+    done = run(
+        "fill",
+        "hands.bvh",
+        "--layer",
+        "--from",
+        "walk.bvh",
+        "--from-range",
+        "20:50",
+        "--at",
+        "60",
+        "--joints",
+        finger,
+    )
+    assert done.code == 2
+    assert f"walk tells nothing of {finger}" in done.err
+    done = run("fill", "walk.bvh", "--layer", "--from", "hands.bvh", "--at", "60", "--joints", "LeftArm")
+    assert done.code == 2
+    assert "beyond the end" in done.err
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "convert walk.bvh hands.bvh --onto hands.bvh",
+        "between --start walk.bvh#60 --target hands.bvh#9 --frames 9 -o hands.bvh",
+        "between --start walk.bvh#60 --target walk.bvh#9 --frames 9 --anchor hands.bvh#8@3 -o hands.bvh",
+        "fill walk.bvh --layer --from hands.bvh --from-range 3:9 --at 9 --joints LeftArm -o hands.bvh",
+        "stitch walk.bvh hands.bvh -o hands.bvh",
+    ],
+)
+def test_no_file_that_was_read_is_written_over(run, rigs, words):
+    before = (rigs / "hands.bvh").read_bytes()
+    done = run(*words.split(), "--force")
+    assert done.code == 2
+    assert "the input" in done.err
+    assert (rigs / "hands.bvh").read_bytes() == before
+
+
+def test_a_map_is_of_the_file_whose_joints_it_names(run, rigs):
+    """Of the one or of the other, whichever; of none it is a mistake."""
+    assert run("skeleton", "walk.bvh", "--save-map", "walk.map.json").code == 0
+    assert run("skeleton", "hands.bvh", "--save-map", "hands.map.json").code == 0
+    plain = run("convert", "walk.bvh", "plain.bvh", "--onto", "hands.bvh")
+    assert plain.code == 0
+    for name in ("walk", "hands"):
+        made = f"{name}.made.bvh"
+        assert run("convert", "walk.bvh", made, "--onto", "hands.bvh", "--map", f"{name}.map.json").code == 0
+        assert (rigs / made).read_text() == (rigs / "plain.bvh").read_text()
+        stitched = run(
+            "stitch",
+            "walk.bvh",
+            "hands.bvh",
+            "--frames",
+            "9",
+            "--map",
+            f"{name}.map.json",
+            "-o",
+            f"{name}.s.bvh",
+        )
+        assert stitched.code == 0
+    odd = (rigs / "walk.map.json").read_text().replace("LeftFoot", "Hoof")
+    (rigs / "odd.map.json").write_text(odd)
+    assert run("convert", "walk.bvh", "x.bvh", "--onto", "hands.bvh", "--map", "odd.map.json").code == 2

@@ -72,6 +72,19 @@ def test_the_motion_tells_the_t_pose_where_the_zero_pose_is_none(walk, rig):
     assert apart.max() < 16
 
 
+@pytest.mark.parametrize("rig", HEAPS)
+def test_a_first_frame_that_is_a_t_pose_tells_it(walk, rig):
+    """As files of rigs begin, and takes of some programs: better than what is worked out of the motion."""
+    rotation = walk.rotation.copy()
+    rotation[0] = walk.skeleton.rest_rotation
+    clip, _ = rigs.build(rig, walk.with_motion(rotation, walk.translation))
+    for some in (clip, clip.slice(0, 1)):
+        body = find_humanoid(some)
+        assert body.rest.how == "frame 0"
+        apart = degrees(body.rotations(clip), find_humanoid(walk).rotations(walk))[1:]
+        assert apart.max() < (0.1 if body.mapping["Spine1"] is not None else 10)
+
+
 def test_in_the_t_pose_all_is_identity(walk):
     """A skeleton posed as its own T-pose says: no canonical rotation, bones along the axes."""
     clip, _ = rigs.build("character_creator", walk)

@@ -74,11 +74,11 @@ def between(
     from interpose.cli.request import check_method
 
     check_method(method, license)
-    said, cut = "", False
+    said, others, cut = "", dict[Path, bool](), False
     if file is not None and not (start or target or frames or anchor):
         chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
     elif file is None and not keys and start and target:
-        file, chosen, clip, said = _blocked(start, target, frames or "auto", anchor, reading)
+        file, chosen, clip, said, others = _blocked(start, target, frames or "auto", anchor, reading)
         cut = True
     else:
         raise RequestError(
@@ -87,12 +87,15 @@ def between(
             "Write keys.bvh --keys 0,30,75, or --start a.bvh#0 --target a.bvh#2 --anchor a.bvh#1@30.",
         )
     outputs = Outputs.choose(file, output, "between", player)
-    outputs.check(file, force)
+    for read in (file, *others):
+        outputs.check(read, force)
     with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
         done = tasks.between(clip, chosen, action, method, seed, advance, cut)
     if cut:
         clip = done.clip
-    return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force)
+    retargeted = [str(path) for path, other in others.items() if other]
+    more = {"retargeted": retargeted} if retargeted else {}
+    return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force, more=more)
 
 
 def _frame(text: str) -> int:
@@ -103,31 +106,33 @@ def _frame(text: str) -> int:
 
 def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
-) -> tuple[Path, list[int], Clip, str]:
+) -> tuple[Path, list[int], Clip, str, dict[Path, bool]]:
     """A clip that holds poses of several files at its keys, and before the first and after the last one what
-    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, and
-    lines for the user."""
+    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, lines
+    for the user, and the other files, each with whether it is of another rig."""
     from interpose import tasks
     from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
-    from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
+    from interpose.observation.timeline import Placement, bounded, fit, joined, other_rig, plausible_length
     from interpose.skeletons.carrier import hips_of
 
-    file, before, last = _pose(start, -1, reading)
-    _, after, first = _pose(target, 0, reading)
-    own, after = after, on_rig_of(after, before)
-    said = (
-        [] if after is own else [f"{target} is on another rig: its motion was retargeted to that of {start}"]
-    )
+    met_at = [_met(text) for text in anchors]
+    named = [_named(text) for text in (start, target, *(what for what, _ in met_at))]
+    file = named[0][0]
+    loaded = reading.load_all([path for path, _ in named])
+    before = loaded[0]
+    others = {path: other_rig(clip, before) is not None for (path, _), clip in zip(named[1:], loaded[1:])}
+    said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
+    clips = [before, *(on_rig_of(clip, before) for clip in loaded[1:])]
+    at = [
+        _moment(path, frame, clip, -1 if k == 0 else 0)
+        for k, ((path, frame), clip) in enumerate(zip(named, clips))
+    ]
+    last, after, first = at[0], clips[1], at[1]
     held = _frame_of(before, last)
     poses = {0: held}
-    for text in anchors:
-        what, _, at = text.rpartition("@")
-        if not what or not at.isdecimal() or int(at) < 1:
-            why = "it is FILE@AT, with AT from 1 on"
-            raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
-        _, clip, frame = _pose(what, 0, reading)
-        poses[int(at)] = fit(_frame_of(on_rig_of(clip, before), frame), held)[0]
+    for (_, when), clip, frame in zip(met_at, clips[2:], at[2:]):
+        poses[when] = fit(_frame_of(clip, frame), held)[0]
     met, end = max(poses), fit(_frame_of(after, first), held)[0]
     beside = fit(after, before)[0]
     moment = min(round(first * before.fps / after.fps), len(beside) - 1)
@@ -161,20 +166,37 @@ def _blocked(
     shift = (float(laid[0] - lay[0]), 0.0, float(laid[2] - lay[2]))
     on = Placement(shift=shift).of(beside.slice(moment + 1, until))
     parts = [before.slice(since, last), blocked, on]
-    return file, [len(parts[0]) + key for key in sorted(poses)], joined(blocked, parts), "\n".join(said)
+    return (
+        file,
+        [len(parts[0]) + key for key in sorted(poses)],
+        joined(blocked, parts),
+        "\n".join(said),
+        others,
+    )
 
 
-def _pose(text: str, usual: int, reading: Reading) -> tuple[Path, Clip, int]:
-    """FILE or FILE#FRAME: the file, its clip, and the frame meant."""
+def _met(text: str) -> tuple[str, int]:
+    """FILE@AT or FILE#FRAME@AT: the pose that is met, and when."""
+    what, _, at = text.rpartition("@")
+    if not what or not at.isdecimal() or int(at) < 1:
+        why = "it is FILE@AT, with AT from 1 on"
+        raise RequestError(f"cannot use the anchor {text}", why, "Write --anchor turn.bvh@20.")
+    return what, int(at)
+
+
+def _named(text: str) -> tuple[Path, int | None]:
+    """FILE or FILE#FRAME."""
     name, _, frame = text.rpartition("#")
-    file, number = (Path(name), int(frame)) if name and frame.isdecimal() else (Path(text), None)
-    clip = reading.load(file)
-    if number is None:
-        number = usual % len(clip)
+    return (Path(name), int(frame)) if name and frame.isdecimal() else (Path(text), None)
+
+
+def _moment(path: Path, frame: int | None, clip: Clip, usual: int) -> int:
+    """The frame of a clip that is meant; `usual` where none is named."""
+    number = usual % len(clip) if frame is None else frame
     if number >= len(clip):
         why = f"the clip has {len(clip)} frames, counted from 0"
-        raise RequestError(f"there is no frame {number} in {file}", why, f"Choose up to {len(clip) - 1}.")
-    return file, clip, number
+        raise RequestError(f"there is no frame {number} in {path}", why, f"Choose up to {len(clip) - 1}.")
+    return number
 
 
 def _frame_of(clip: Clip, frame: int) -> Clip:

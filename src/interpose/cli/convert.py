@@ -48,13 +48,13 @@ def convert(
             as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
         force: replace an existing file.
     """
-    from interpose.finish import on_rig_of
+    from interpose.finish import retarget
     from interpose.formats import save
     from interpose.geometry.time import resample
-    from interpose.observation.timeline import fit
+    from interpose.observation.timeline import other_rig
 
-    clip = reading.load(file)
-    if output.exists() and output.samefile(file):
+    clip, rig = reading.load_all([file, onto or file])
+    if output.exists() and (output.samefile(file) or output.samefile(onto or file)):
         raise RequestError(
             f"cannot write {output}", "it is the input, which stays as it is", "Choose another name."
         )
@@ -67,22 +67,21 @@ def convert(
         )
     made, kept = clip, ""
     if onto is not None:
-        rig = replace(reading.load(onto), fps=clip.fps)
-        put = on_rig_of(clip, rig)
-        made = replace(fit(put, rig)[0], source=rig.source)
-        kept = _kept(rig) if put is not clip else ""
+        made = retarget(clip, rig)
+        kept = _kept(clip, rig) if other_rig(clip, rig) else ""
     made = replace(resample(made, fps, smooth=True), source=made.source) if fps is not None else made
     notes = save(replace(made, name=output.stem), output, force=force)
-    say("\n".join(describe(file, clip)))
+    say("\n".join([*describe(file, clip), *(describe(onto, rig) if onto is not None else [])]))
     for note in (*([kept] if kept else []), *notes):
         say(f"note: {note}")
     say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps")
 
 
-def _kept(rig: Clip) -> str:
-    """What other rigs tell nothing of."""
-    from interpose.skeletons import find_mapping
+def _kept(clip: Clip, rig: Clip) -> str:
+    """What the motion of another rig tells nothing of."""
+    from interpose.finish.retargeting import common
 
-    mapped = find_mapping(rig.skeleton).mapped[1]
-    others = [name for joint, name in enumerate(rig.skeleton.names) if joint not in mapped]
-    return f"{names(others, most=4)}: as in {rig.name}, in the mean" if others else ""
+    told = common(clip, rig)
+    others = [name for name in rig.skeleton.names if name not in told]
+    what = f"{len(others)} joint{'s keep their' if len(others) > 1 else ' keeps its'} mean pose in {rig.name}"
+    return f"{what}: {names(others)}" if others else ""

@@ -106,8 +106,11 @@ def fill(
         roles_of,
     )
 
-    clip = reading_of(gaps, reading).load(file, roles_of(gaps))
-    parts = part_of(from_, from_range, at, joints, reading)
+    if from_ is None:
+        clip = reading_of(gaps, reading).load(file, roles_of(gaps))
+    else:
+        clip = reading_of(gaps, reading).load_all([file, from_])[0]
+    parts = part_of(from_, from_range, at, joints, clip, reading)
     if layer and not gap:
         gap = layered(parts, clip)
     if parts and not gap and gaps is None:
@@ -129,10 +132,15 @@ def fill(
     if max_gap is not None and max_gap < 1:
         fix = "Write for example --max-gap 90."
         raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
+    lines = [request.said] * bool(request.said)
+    lines += [
+        f"{one.file} is on another rig: its motion was retargeted" for one in request.parts if one.retargeted
+    ]
     outputs = Outputs.choose(file, output, "filled", player)
     if dry_run:
         return _dry_run(file, clip, request, pins, max_gap, outputs, json, force, gaps)
-    outputs.check(file, force, gaps)
+    for read in (file, *(one.file for one in request.parts)):
+        outputs.check(read, force, gaps)
     missing = sum(map(len, request.gaps))
     with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
         done = tasks.fill(
@@ -145,7 +153,7 @@ def fill(
             methods=request.methods,
             progress=advance,
             action=request.action,
-            parts=[part for _, part in request.parts],
+            parts=[one.part for one in request.parts],
             path=points,
             pins=pins,
         )
@@ -155,8 +163,9 @@ def fill(
     more |= {"path": request.path} if request.path else {}
     more |= {"pinned": request.pins} if request.pins else {}
     more |= {"left": request.left} if request.left else {}
+    said = "\n".join(lines)
     code = finish(
-        "fill", file, outputs, clip, done, request.seed, why, request.said, json=json, force=force, more=more
+        "fill", file, outputs, clip, done, request.seed, why, said, json=json, force=force, more=more
     )
     return code or (4 if request.left else 0)
 
@@ -184,7 +193,7 @@ def _dry_run(
     from interpose.observation import Observation
     from interpose.observation.part import lay
 
-    parts = tasks.fitted([part for _, part in request.parts], clip)
+    parts = [one.part for one in request.parts]
     clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), parts)
     seen = replace(seen, pins=tuple(pins))
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Group, Parameter
 
-from interpose.errors import FileError
+from interpose.errors import FileError, RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
@@ -64,6 +64,24 @@ class Reading:
         clip = load(path, self.unit, self.up, self.joint_positions, self.skeleton, self.file_fps, said)
         find_mapping(clip.skeleton)  # says what is wrong with the roles, before anything else is done
         return clip
+
+    def load_all(self, paths: Sequence[Path]) -> list[Clip]:
+        """The clips in several files, of different rigs perhaps: --map and --root are of those in which their
+        joints are, and of one at least."""
+        found = {path: self.load_fitting(path) for path in dict.fromkeys(paths)}
+        wrong = [error for _, error in found.values()]
+        if all(wrong) and wrong[0]:
+            raise wrong[0]
+        return [found[path][0] for path in paths]
+
+    def load_fitting(self, path: Path) -> tuple[Clip, RequestError | None]:
+        """The clip in one of several files, and why --map or --root are not of it, if they are not."""
+        try:
+            return self.load(path), None
+        except RequestError as error:
+            if self.map is None and self.root is None:
+                raise
+            return replace(self, map=None, root=None).load(path), error
 
 
 def split_names(texts: list[str]) -> tuple[str, ...]:

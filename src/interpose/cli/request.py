@@ -23,6 +23,22 @@ OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot 
 
 
 @dataclass(frozen=True)
+class Lent:
+    """Poses of single joints that another clip gives.
+
+    Attributes:
+        file, frames: whose they are, and which.
+        part: the same on the skeleton of the clip that they are given to, and at its rate.
+        retargeted: whether the file is of another rig.
+    """
+
+    file: Path
+    frames: str
+    part: Part
+    retargeted: bool
+
+
+@dataclass(frozen=True)
 class Request:
     """What is to be filled, and how.
 
@@ -34,7 +50,7 @@ class Request:
         why: why a gap stays open, by number, where an earlier report says it.
         said: lines for the user: where the gaps come from.
         action: what the motion is, for methods that know actions.
-        parts: poses of single joints from other clips, each with the path of its clip.
+        parts: poses of single joints from other clips.
         path: points of the floor, as they were written.
         pins: places of joints, as they were written.
         left: what is missing, too, and is another verb's.
@@ -49,7 +65,7 @@ class Request:
     why: dict[int, str] = field(default_factory=dict)
     said: str = ""
     action: str = ""
-    parts: list[tuple[Path, Part]] = field(default_factory=list)
+    parts: list[Lent] = field(default_factory=list)
     path: list[str] = field(default_factory=list)
     pins: list[str] = field(default_factory=list)
     left: str = ""
@@ -89,7 +105,9 @@ def from_options(
             fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."
             raise RequestError("--gap does not go with a report", why, fix)
         request = (
-            _replay(gaps, filled, content, reading) if is_report(content) else Request([*filled, *listed])
+            _replay(gaps, filled, content, clip, reading)
+            if is_report(content)
+            else Request([*filled, *listed])
         )
     elif listed:
         request = Request(listed)
@@ -128,9 +146,11 @@ def _scanned(file: Path, clip: Clip) -> Request:
 
 
 def part_of(
-    path: Path | None, span: str | None, at: int | None, joints: list[str], reading: Reading
-) -> list[tuple[Path, Part]]:
-    """The part that the options of `fill` name: --from, --from-range, --at and --joints."""
+    path: Path | None, span: str | None, at: int | None, joints: list[str], clip: Clip, reading: Reading
+) -> list[Lent]:
+    """What the options of `fill` name for a clip: --from, --from-range, --at and --joints."""
+    from interpose import tasks
+
     if path is None:
         if span is not None or at is not None:
             why = "--from-range and --at say which frames of another clip go where"
@@ -142,19 +162,25 @@ def part_of(
         raise RequestError(
             "--from needs --at and --joints", why, "Write --at 130 --joints RightArm,RightHand."
         )
-    clip = reading.load(path)
-    whole = Gap(0, len(clip)) if span is None else _frames(span)
-    return [(path, Part(clip, whole.start, whole.stop, at, names))]
+    other = reading.load_fitting(path)[0]
+    whole = Gap(0, len(other)) if span is None else _frames(span)
+    part = Part(other, whole.start, whole.stop, at, names)
+    (fitted,) = tasks.fitted([part], clip)
+    return [Lent(path, f"{whole.start}:{whole.stop}", fitted, fitted.clip.skeleton is not other.skeleton)]
 
 
-def layered(parts: list[tuple[Path, Part]], clip: Clip) -> list[str]:
+def layered(parts: list[Lent], clip: Clip) -> list[str]:
     """The gap in which --layer lays the part: with what it takes to ease it in and out."""
     if not parts:
         why = "--layer lays joints of another clip over the motion"
         raise RequestError("no other clip is named", why, "Name it with --from FILE.")
-    (_, part), over = parts[0], max(2, round(EASED * clip.fps))
-    stop = part.at + part.stop - part.start + over
-    return [f"{max(part.at - over, 0)}:{min(stop, len(clip))}"]
+    part, over = parts[0].part, max(2, round(EASED * clip.fps))
+    end = part.at + part.stop - part.start
+    if end > len(clip):
+        count = part.stop - part.start
+        why = f"the clip has {len(clip)} frames, and {count} from {part.at} on reach to {end}"
+        raise RequestError("the other clip reaches beyond the end", why, "Take fewer with --from-range.")
+    return [f"{max(part.at - over, 0)}:{min(end + over, len(clip))}"]
 
 
 def _frames(text: str) -> Gap:
@@ -243,15 +269,23 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
     return found
 
 
-def parts_to_dict(parts: list[tuple[Path, Part]]) -> list[dict[str, Any]]:
+def parts_to_dict(parts: list[Lent]) -> list[dict[str, Any]]:
     """For a report, so that it can be replayed."""
     return [
-        {"file": str(path), "frames": f"{part.start}:{part.stop}", "at": part.at, "joints": list(part.joints)}
-        for path, part in parts
+        {
+            **{
+                "file": str(one.file),
+                "frames": one.frames,
+                "at": one.part.at,
+                "joints": list(one.part.joints),
+            },
+            **({"retargeted": True} if one.retargeted else {}),
+        }
+        for one in parts
     ]
 
 
-def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Reading) -> Request:
+def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, reading: Reading) -> Request:
     """The gaps of a report, filled and open ones as they were, each by the method named in it."""
     left = content["open"]
     open_gaps = [
@@ -263,13 +297,13 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], reading: Rea
     parts = [
         part
         for one in content.get("parts", [])
-        for part in part_of(Path(one["file"]), one["frames"], one["at"], one["joints"], reading)
+        for part in part_of(Path(one["file"]), one["frames"], one["at"], one["joints"], clip, reading)
     ]
     if content.get("layer"):
-        filled += [Gap(p.at, p.at + p.stop - p.start, p.joints) for _, p in parts]
+        filled += [Gap(p.at, p.at + p.stop - p.start, p.joints) for p in (one.part for one in parts)]
     else:
         # The report of a gap with parts lists their frames by themselves, without the joints that they gave.
-        holed = [gap for gap in filled if any(gap.start <= part.at < gap.stop for _, part in parts)]
+        holed = [gap for gap in filled if any(gap.start <= one.part.at < gap.stop for one in parts)]
         filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
     return Request(
         [*filled, *open_gaps],

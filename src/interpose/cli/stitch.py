@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -96,7 +97,7 @@ def stitch(
     check_method(method, license)
     if not files:
         raise RequestError("no clips are named", "it takes two or more", "Write stitch walk.bvh run.bvh.")
-    pieces = [_read(text, reading) for text in files]
+    pieces = _read(files, reading)
     pieces = [_fitted(piece, pieces[0].whole) for piece in pieces]
     first = pieces[0].file
     outputs = Outputs.choose(first, output, "stitched", player)
@@ -123,27 +124,32 @@ def stitch(
     return 0
 
 
-def _read(text: str, reading: Reading) -> Piece:
-    """FILE or FILE#START:STOP."""
+def _read(texts: Sequence[str], reading: Reading) -> list[Piece]:
+    """Of each FILE or FILE#START:STOP."""
+    named = [_named(text) for text in texts]
+    wholes = reading.load_all([file for file, _ in named])
+    return [
+        Piece(file, part, whole, _part(file, whole, part) if part is not None else whole)
+        for (file, part), whole in zip(named, wholes)
+    ]
+
+
+def _named(text: str) -> tuple[Path, str | None]:
+    """The file, and the part of it."""
     name, _, part = text.rpartition("#")
-    if not name or Path(text).exists():
-        whole = reading.load(Path(text))
-        return Piece(Path(text), None, whole, whole)
-    whole = reading.load(Path(name))
+    return (Path(text), None) if not name or Path(text).exists() else (Path(name), part)
+
+
+def _part(file: Path, whole: Clip, part: str) -> Clip:
+    """Some frames, with the file's layout."""
     try:
         span = Gap.parse(part, clip=whole)
     except RequestError:
-        fix = f"Write {name}#12:80 for the frames 12 to 79."
-        raise RequestError(f"cannot read the part {part} of {name}", "a part is START:STOP", fix) from None
+        fix = f"Write {file}#12:80 for the frames 12 to 79."
+        raise RequestError(f"cannot read the part {part} of {file}", "a part is START:STOP", fix) from None
     if not 0 <= span.start < span.stop <= len(whole):
         why = f"the clip has {len(whole)} frames, counted from 0"
-        raise RequestError(f"there are no frames {part} in {name}", why, f"Choose some of 0:{len(whole)}.")
-    return Piece(Path(name), part, whole, _part(whole, part))
-
-
-def _part(whole: Clip, part: str) -> Clip:
-    """Some frames, with the file's layout."""
-    span = Gap.parse(part, clip=whole)
+        raise RequestError(f"there are no frames {part} in {file}", why, f"Choose some of 0:{len(whole)}.")
     chosen = slice(span.start, span.stop)
     return whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
 
@@ -155,7 +161,9 @@ def _fitted(piece: Piece, first: Clip) -> Piece:
     clip = on_rig_of(piece.whole, first) if len(piece.whole) and len(first) else piece.whole
     if clip is piece.whole:
         return piece
-    return replace(piece, clip=_part(clip, piece.part) if piece.part else clip, retargeted=True)
+    return replace(
+        piece, clip=_part(piece.file, clip, piece.part) if piece.part is not None else clip, retargeted=True
+    )
 
 
 def _lengths(text: str) -> str | list[int] | int:

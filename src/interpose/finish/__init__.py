@@ -2,7 +2,7 @@
 
 from interpose.finish.guarantees import complete
 from interpose.finish.report import Completion, GapReport, Provenance, Report
-from interpose.finish.retarget import on_rig_of, retarget
+from interpose.finish.retargeting import on_rig_of, retarget
 from interpose.finish.solve import solve
 
 __all__ = ["Completion", "GapReport", "Provenance", "Report", "complete", "on_rig_of", "retarget", "solve"]

@@ -15,6 +15,7 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
+from interpose.observation.stiff import even, held
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -57,9 +58,8 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "rest pose", "outlier", "lost", "exchanged",
-            "flipped", "jump",
-            "repeated" or "noisy".
+        kind: "missing", "frozen", "frozen position", "straight", "rest pose", "outlier", "lost",
+            "exchanged", "flipped", "jump", "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -88,6 +88,10 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose, jump or not; of all joints that turn, when the position
       goes on.
+      A limb, or its end, that hardly moves for .3 s (a joint alone for .6 s) and then is elsewhere from one
+      frame to the next is frozen, too: trackers hold what they lose with the noise of what they see.
+    - "straight": joints that turn evenly for .3 s, as other programs interpolate; more than a third of all
+      that move are the whole pose. Not those that do so in much of the clip: they were animated so.
     - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
       that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
@@ -118,6 +122,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
+        findings += _stiff(clip, findings)
         swapped, names = exchanges(clip), clip.skeleton.names
         findings += [
             Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
@@ -289,15 +294,40 @@ def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
     return [Finding("frozen", names, 0, len(clip), "the other side moves")] if dead else []
 
 
+def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
+    """Joints that are held with a tremble, or led straight; not what has been found already."""
+    names, lost = clip.skeleton.names, _found(clip, findings)
+    found = []
+    for joints, start, stop in held(clip):
+        if not lost[start:stop, list(joints)].any():
+            lost[start:stop, list(joints)] = True
+            note = f"hardly moves for {(stop - start) / clip.fps:.2f} s, beside a jump"
+            found.append(Finding("frozen", tuple(names[joint] for joint in joints), start, stop, note))
+    moving = (np.ptp(clip.rotation, axis=0).max(axis=1) > LIFELESS).sum()
+    for joints, start, stop in even(clip):
+        if not lost[start:stop, list(joints)].any():
+            some = None if 3 * len(joints) > moving else tuple(names[joint] for joint in joints)
+            note = f"turns evenly for {(stop - start) / clip.fps:.2f} s, as if interpolated"
+            found.append(Finding("straight", some, start, stop, note))
+    return found
+
+
+def _found(clip: Clip, findings: list[Finding]) -> np.ndarray:
+    """(F, J) what findings speak of."""
+    lost = np.zeros((len(clip), len(clip.skeleton)), bool)
+    for one in findings:
+        joints = slice(None) if one.joints is None else [clip.skeleton.index(name) for name in one.joints]
+        lost[one.start : one.stop, joints] = True
+    return lost
+
+
 def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Values that drop out, but those that have been found already; joints that do so together are one."""
     seen = broken(clip)
     # Joints that stand still for most of the clip have no data to be restored from.
     turned, _ = _steps(clip, Observation.full(clip))
     lost = ~(seen.rotation & seen.translation) & ((turned > STILL).mean(axis=0) > 0.5)
-    for one in findings:
-        joints = slice(None) if one.joints is None else [clip.skeleton.index(name) for name in one.joints]
-        lost[one.start : one.stop, joints] = False
+    lost &= ~_found(clip, findings)
     together: dict[tuple[int, int], list[str]] = {}
     for name, column in zip(clip.skeleton.names, lost.T):
         for run in runs(column):

@@ -36,8 +36,8 @@ HINGES = {
     for a, b in (("UpLeg", "Leg"), ("Arm", "ForeArm"))
 }
 # Cosines by which legs may be off the vertical and elbows bent in a zero pose, which somebody has modelled,
-# and in a frame, which may be any.
-LENIENT, STRICT = 0.8, 0.96
+# in a first frame with arms out, with which people do not begin, and in a frame, which may be any.
+LENIENT, FIRST, STRICT = 0.8, 0.9, 0.96
 # An estimated axis that is nearer to one of the joint's own than this is that one.
 AXIS = np.cos(np.radians(12.0))
 # In the T-pose elbows do not bend straight ahead but a little downwards: the axis of the left one. Measured
@@ -111,6 +111,10 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
             "the zero pose is none, and there is no motion to tell it",
             "Give a clip with some motion, or name a rest frame.",
         )
+    turned, placed = (some[0] for some in clip.slice(0, 1).kinematics())
+    if _kind(mapping, placed, FIRST) == "T":
+        # Files of rigs, and takes of some programs, begin with it.
+        return Rest(_from_pose(mapping, turned, placed), "T", "frame 0")
     return Rest(estimate(mapping, clip), pose, "motion")
 
 

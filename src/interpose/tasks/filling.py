@@ -12,6 +12,8 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Report, complete, on_rig_of, seams
 from interpose.finish.path import spans
+from interpose.finish.retargeting import common
+from interpose.geometry.time import resample
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.part import lay, misfits
@@ -51,8 +53,8 @@ def fill(
         methods: the method of single gaps by number, in place of `method`.
         progress: called with the share done, 0 to 1.
         action: what the motion in the gaps is, for methods that know actions; "auto" then is one of them.
-        parts: poses of single joints that other clips give inside of the gaps; of other rigs they are brought
-            onto this one's first.
+        parts: poses of single joints that other clips give inside of the gaps; what is of
+            another rig, or at another rate, is brought to this one's first.
         path: x and z in metres that the hips are led over, by frame; inside of gaps of the whole pose.
         pins: where joints are to be, or how turned, at frames of gaps; besides those of an observation.
         temperature: for methods that sample, how far their answers lie apart; 1 is as in training.
@@ -131,8 +133,27 @@ def fill(
 
 
 def fitted(parts: Iterable[Part], clip: Clip) -> list[Part]:
-    """Parts on the skeleton of a clip, whatever rig they are of."""
-    return [replace(part, clip=on_rig_of(part.clip, clip)) if misfits(clip, part) else part for part in parts]
+    """Parts on the skeleton of a clip and at its rate, whatever rig and rate they are of.
+
+    Raises:
+        RequestError: a joint that another rig tells nothing of; what `on_rig_of` refuses.
+    """
+    done = []
+    for part in parts:
+        whole = part.clip
+        if misfits(clip, part):
+            part = replace(part, clip=on_rig_of(whole, clip))
+            if mute := [name for name in part.joints if name not in common(whole, clip)]:
+                raise RequestError(
+                    f"{whole.name or 'the other clip'} tells nothing of {mute[0]}",
+                    "it is of another rig, and no joint of it is the same",
+                    f"Choose some of {', '.join(sorted(common(whole, clip)))}.",
+                )
+        if part.clip.fps != clip.fps and 0 <= part.start < part.stop <= len(whole):
+            at_rate = resample(part.clip.slice(part.start, part.stop), clip.fps, smooth=True)
+            part = replace(part, clip=at_rate, start=0, stop=len(at_rate))
+        done.append(part)
+    return done
 
 
 def _handed(clip: Clip, observation: Observation) -> Clip:

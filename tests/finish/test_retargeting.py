@@ -31,31 +31,58 @@ def test_there_and_back_it_is_the_same_motion(cmu_walk, hands):
     back = retarget(there, cmu_walk)
     mapped = list(find_mapping(cmu_walk.skeleton).mapped[1])
     away = np.linalg.norm(back.positions() - cmu_walk.positions(), axis=-1)[:, mapped]
-    assert away.mean() < 0.005
+    assert away.mean() < 0.01
 
 
-def test_bodies_hold_themselves_alike_and_ankles_go_by_the_legs(cmu_walk, hands):
+def test_bodies_hold_themselves_alike_and_toes_go_by_the_legs(cmu_walk, hands):
     there = retarget(cmu_walk, hands)
     one, two = find_humanoid(cmu_walk), find_humanoid(hands)
-    trunk = [JOINTS.index(name) for name in ("Hips", "Spine2", "LeftArm", "RightForeArm", "Head")]
+    trunk = [JOINTS.index(name) for name in ("Hips", "Spine2", "LeftArm", "RightForeArm")]
     apart = rotations.angle(one.rotations(cmu_walk)[:, trunk], two.rotations(there)[:, trunk])
     assert np.degrees(apart).max() < 1e-4
-    ankles = [JOINTS.index("LeftFoot"), JOINTS.index("RightFoot")]
-    before, after = (
-        body.positions(clip)[:, ankles] * body.scale for body, clip in ((one, cmu_walk), (two, there))
-    )
-    off = np.abs(np.diff(after, axis=0) - np.diff(before, axis=0))
+    before, after = (body.positions(clip) * body.scale for body, clip in ((one, cmu_walk), (two, there)))
+    neck = [points[:, JOINTS.index("Head")] - points[:, JOINTS.index("Neck")] for points in (before, after)]
+    assert np.degrees(rotations.angle(rotations.identity(), rotations.between(*neck))).max() < 0.1
+    toes = [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]
+    off = np.abs(np.diff(after[:, toes], axis=0) - np.diff(before[:, toes], axis=0))
     assert np.median(off) < 1e-4, "what stands, stands"
     assert off.max() < 5e-3, "but for legs that are as good as straight"
 
 
-def test_the_floor_is_that_of_the_other_clip(cmu_walk, hands):
-    high = Placement(shift=(0.0, 0.5, 0.0)).of(hands, carriers(hands))
-    low, raised = retarget(cmu_walk, hands).positions(), retarget(cmu_walk, high).positions()
-    assert np.allclose(raised - low, [0.0, 0.5, 0.0], atol=1e-6)
-    mapped = list(find_mapping(hands.skeleton).mapped[1])
-    feet = [np.percentile(p[:, mapped, 1].min(axis=1), 10) for p in (low, hands.positions())]
-    assert feet[0] == pytest.approx(feet[1], abs=1e-6)
+def test_bodies_stand_on_the_floor_whatever_they_do_and_wherever_the_rig_is(cmu_walk, hands):
+    """A rig of one pose with its hips at the origin, and a motion on a box, change nothing."""
+    low = retarget(cmu_walk, hands).positions()
+    rest = np.broadcast_to(hands.skeleton.rest_rotation, (1, len(hands.skeleton), 4))
+    rig = hands.with_motion(rest, np.zeros((1, 1, 3)))
+    assert np.abs(retarget(cmu_walk, rig).positions() - low)[..., 1].max() < 0.04
+    ratio = find_mapping(hands.skeleton).leg_length / find_mapping(cmu_walk.skeleton).leg_length
+    on_a_box = Placement(shift=(0.0, 0.5, 0.0)).of(cmu_walk, carriers(cmu_walk))
+    raised = retarget(on_a_box, hands).positions() - low
+    assert np.abs(raised[..., 1] - 0.5 * ratio).max() < 0.03
+    toes = [find_mapping(hands.skeleton)[name] for name in ("LeftToe", "RightToe")]
+    stands = [np.percentile(p[:, toes, 1], 20) for p in (low, hands.positions())]
+    assert stands[0] == pytest.approx(stands[1], abs=0.015)
+
+
+def test_a_part_of_a_clip_is_where_it_is_in_the_whole(cmu_walk, hands):
+    whole, part = retarget(cmu_walk, hands).positions(), retarget(cmu_walk.slice(100, 160), hands).positions()
+    assert np.abs(whole[100:160] - part).max() < 0.02
+
+
+def test_hips_sink_before_legs_are_torn_straight(cmu_walk, hands):
+    """A rig that stands higher on its toes, of which the legs would have to be longer."""
+    bones = hands.skeleton.rest_translation.copy()
+    toes = [find_mapping(hands.skeleton)[name] for name in ("LeftToe", "RightToe")]
+    bones[toes] *= 1.8
+    made = retarget(cmu_walk, replace(hands, skeleton=replace(hands.skeleton, rest_translation=bones)))
+    placed = made.positions()
+    mapping = find_mapping(made.skeleton)
+    for side in ("Left", "Right"):
+        hip, knee, ankle = (placed[:, mapping[side + part]] for part in ("UpLeg", "Leg", "Foot"))
+        way, bent = np.linalg.norm(ankle - hip, axis=-1), np.linalg.norm(knee - hip, axis=-1)
+        assert (way / (bent + np.linalg.norm(ankle - knee, axis=-1))).max() < 0.9999
+    own = np.linalg.norm(np.diff(cmu_walk.positions(), 2, axis=0), axis=-1).max()
+    assert np.linalg.norm(np.diff(placed, 2, axis=0), axis=-1).max() < 1.5 * own
 
 
 def test_it_follows_turns_and_ways_of_the_motion(cmu_walk, hands):
@@ -86,9 +113,11 @@ def test_a_root_goes_along_if_it_does_so_there(cmu_walk, hands):
     assert np.ptp(made[:, 0], axis=0).max() > 1.0
 
 
-def test_clips_of_one_rig_stay_as_they_are(cmu_walk, data):
+def test_clips_of_one_rig_keep_their_own_rotations(cmu_walk, hands, data):
     run = interpose.load(data / "cmu_run.bvh")
     assert on_rig_of(run, cmu_walk) is run
+    assert np.array_equal(retarget(hands, hands).rotation, hands.rotation)
+    assert np.array_equal(retarget(run, cmu_walk).rotation, run.rotation)
 
 
 def test_what_is_no_humanoid_is_refused(cmu_walk):
@@ -96,8 +125,9 @@ def test_what_is_no_humanoid_is_refused(cmu_walk):
     snake = Clip(chain, np.tile([1.0, 0, 0, 0], (4, 3, 1)), np.zeros((4, 1, 3)), 30.0, (0,))
     with pytest.raises(RequestError, match="another skeleton"):
         on_rig_of(snake, cmu_walk)
-    with pytest.raises(RequestError, match="no humanoid"):
+    with pytest.raises(RequestError, match="another skeleton") as caught:
         retarget(snake, cmu_walk)
+    assert "no humanoid" in caught.value.why
 
 
 def test_a_left_handed_rig_moves_as_well(cmu_walk, hands):

@@ -1,0 +1,164 @@
+"""The motion of one skeleton on another: what lets clips of different rigs be laid one after another.
+
+Bodies hold themselves alike: every joint is turned from its T-pose as the same joint of the other body is.
+Ways and heights go by the lengths of the legs, and the legs bend until the toes are where that puts them: who
+stands on the ball of a foot still does, however long the foot is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError
+from interpose.finish import measures
+from interpose.finish.feet import Leg, legs, reach
+from interpose.finish.windows import rounded, spread
+from interpose.geometry import rotations
+from interpose.observation.timeline import fit, joined, other_rig
+from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping
+from interpose.skeletons.carrier import rooted
+
+# Metres, of a body with the canonical leg: toes rest so high over the floor, as a rule, and as far from there
+# in one rig or another. Stances tell it: toes slower than this (metres a second), for so many seconds.
+RESTS, LEVEL, SLOW, SECONDS = 0.03, 0.05, 0.15, 0.3
+# The share of its length to which a leg may be stretched (or as far as it is already) before the hips sink;
+# the bound is rounded off by the second (metres), and comes and goes over so many seconds.
+TAUT, ROUND, OVER = 0.98, 0.005, 0.15
+NECK, HEAD = JOINTS.index("Neck"), JOINTS.index("Head")
+SHORT = 0.01  # metres: what a shorter bone points at means nothing
+
+
+def retarget(clip: Clip, like: Clip) -> Clip:
+    """The motion of a clip on the skeleton of another one.
+
+    Clips of one rig, people's sizes apart, keep the local rotations of all joints. Else joints that are not
+    among the 22 canonical ones (fingers, twists, targets) are as in `like` in the mean, and a root above the
+    hips goes along if it does so there. Floors are at height 0.
+
+    Args:
+        clip: F frames of a humanoid.
+        like: a clip of another humanoid: its skeleton, and the layout of its file.
+
+    Returns:
+        F frames at the rate of `clip`.
+
+    Raises:
+        RequestError: the rigs differ, and one of them is no humanoid, or its T-pose cannot be found.
+    """
+    on_rig = on_rig_of(clip, like)
+    return replace(fit(on_rig, replace(like, fps=clip.fps))[0], source=like.source)
+
+
+def on_rig_of(clip: Clip, like: Clip) -> Clip:
+    """The clip itself where its rig is that of `like`, people's sizes apart; else its motion on that rig.
+
+    Raises:
+        RequestError: as `retarget`.
+    """
+    error = other_rig(clip, like)
+    if error is None:
+        return clip
+    for one in (clip, like):
+        if lacking := find_mapping(one.skeleton).lacking:
+            raise RequestError(
+                error.what,
+                f"{error.why}; and {one.name or 'one of them'} is no humanoid, whose motion could be brought"
+                f" onto other rigs: nothing was found for {', '.join(lacking)}",
+                "Name its joints with --map, or use clips of one rig.",
+            )
+    return _brought(clip, like)
+
+
+def common(clip: Clip, like: Clip) -> set[str]:
+    """The names of the joints of `like` that the motion of a clip of another rig tells of."""
+    theirs, mine = find_mapping(clip.skeleton), find_mapping(like.skeleton)
+    both = zip(theirs.joints, mine.joints)
+    return {like.skeleton.names[own] for other, own in both if own is not None and other is not None}
+
+
+def _brought(clip: Clip, like: Clip) -> Clip:
+    """`retarget` between different rigs."""
+    theirs, mine = find_humanoid(clip), find_humanoid(like)
+    points = theirs.positions(clip) * theirs.scale
+    turned = _nodded(theirs.rotations(clip), points, theirs, mine)
+    toes = all(
+        body.mapping[side + "Toe"] is not None for body in (theirs, mine) for side in ("Left", "Right")
+    )
+    ends = [JOINTS.index(side + ("Toe" if toes else "Foot")) for side in ("Left", "Right")]
+    points[..., 1] += _rests(mine, like, ends) - _rests(theirs, clip, ends)
+    # Who stands higher on the same toes has the hips higher, too.
+    over = (_instep(mine) - _instep(theirs)) * toes
+    points /= mine.scale
+    held = rotations.normalize(rotations.continuous(like.rotation).mean(axis=0))
+    frames = len(clip), 1, 1
+    base = like.with_motion(np.tile(held, frames), np.tile(like.translation.mean(axis=0), frames))
+    base = replace(base, fps=clip.fps)
+    root, goals = mine.root_over(points, turned[:, 0]), points[:, ends] * mine.hand
+    root[:, 1] += over / mine.scale
+    made = mine.to_clip(turned, root, base)
+    root[:, 1] -= _sunk(made, goals, toes)
+    made = mine.to_clip(turned, root, base)
+    for leg in legs(made.skeleton):
+        rotation = reach(made.skeleton, leg, made.rotation, *made.kinematics(), _foot(made, leg, goals, toes))
+        made = made.with_motion(rotation, made.translation)
+    # A root above the hips goes along if it does so in the other clip.
+    whole = joined(like, [like, made])
+    known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
+    done = rooted(whole, known).slice(len(like), len(whole))
+    return replace(done, fps=clip.fps, name=clip.name, source=None)
+
+
+def _nodded(turned: np.ndarray, points: np.ndarray, theirs: Humanoid, mine: Humanoid) -> np.ndarray:
+    """Canonical rotations (F, 22, 4) with a neck that points where that of points (F, 22, 3) does, and a head
+    that goes along: zero poses hold their necks by up to 35 degrees differently."""
+    both = all(body.mapping[name] is not None for body in (theirs, mine) for name in ("Neck", "Head"))
+    way = points[:, HEAD] - points[:, NECK]
+    if not both or min(np.linalg.norm(way, axis=-1).min(), np.linalg.norm(mine.bones[HEAD])) < SHORT:
+        return turned
+    nod = rotations.between(rotations.rotate(turned[:, NECK], mine.bones[HEAD]), way)
+    done = turned.copy()
+    done[:, [NECK, HEAD]] = rotations.multiply(nod[:, None], turned[:, [NECK, HEAD]])
+    return done
+
+
+def _rests(body: Humanoid, clip: Clip, ends: list[int]) -> float:
+    """Metres of a body with the canonical leg: how high toes, or ankles, are over the floor they stand on.
+
+    By how high they are while they stand still about there; what stands elsewhere stands on something.
+    """
+    toes = JOINTS[ends[0]].endswith("Toe")
+    usual = RESTS if toes else RESTS - float(BONES[JOINTS.index("LeftToe"), 1])
+    points = body.positions(clip)[:, ends] * body.scale
+    if len(points) < 2:
+        return usual
+    height = points[..., 1]
+    stands = (measures.speed(points, clip.fps) < SLOW) & (np.abs(height - usual) < LEVEL)
+    return float(np.median(height[stands])) if stands.sum() > SECONDS * clip.fps else usual
+
+
+def _instep(body: Humanoid) -> float:
+    """Metres of a body with the canonical leg: how high ankles are over toes in the T-pose."""
+    toes = [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]
+    return float(-body.bones[toes, 1].mean() * body.scale)
+
+
+def _foot(clip: Clip, leg: Leg, goals: np.ndarray, toes: bool) -> np.ndarray:
+    """(F, 2, 3) where ankle and toe are to be, turned as they are, for toes, or ankles, to be at the goals of
+    both legs (F, 2, 3)."""
+    feet = clip.positions()[:, leg.foot]
+    return np.asarray(feet + (goals[:, leg.side] - feet[:, int(toes)])[:, None])
+
+
+def _sunk(clip: Clip, goals: np.ndarray, toes: bool) -> np.ndarray:
+    """(F,) metres by which the hips sink for legs not to be stretched; arguments as in `_foot`."""
+    placed, short = clip.positions(), np.full(len(clip), -np.inf)
+    for leg in legs(clip.skeleton):
+        hip, knee, ankle = (placed[:, joint] for joint in (leg.thigh, leg.knee, leg.ankle))
+        length = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
+        own = np.linalg.norm(ankle - hip, axis=-1)
+        asked = np.linalg.norm(_foot(clip, leg, goals, toes)[:, 0] - hip, axis=-1)
+        short = np.maximum(short, asked - np.maximum(own, TAUT * length))
+    return spread(rounded(short, ROUND), OVER * clip.fps) if np.isfinite(short).all() else np.zeros(len(clip))
