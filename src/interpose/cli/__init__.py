@@ -24,13 +24,14 @@ VERBS = {
     "Your clips": {
         "scan": "find what looks missing: frozen runs, stray rest poses",
         "fill": "fill gaps; what is not missing comes back unchanged",
+        "compare": "see what several methods make of a gap, before one is chosen",
         "between": "generate the motion between key poses",
         "stitch": "lay clips one after another, and generate what lies between them",
         "recover": "recover joints that are missing in the whole clip or in a range",
         "denoise": "smooth noise, and fill joints that drop out or spike",
         "forecast": "go on with a clip, in one or in several ways",
         "skeleton": "say which joint is which: how a skeleton is understood",
-        "convert": "write a clip in another format, or at another frame rate",
+        "convert": "write a clip in another format, at another rate, on another skeleton",
     },
     "Getting to know it": {
         "demo": "see a gap filled in a real clip",
