@@ -152,11 +152,14 @@ def fill(
 
     clip = _clip(clip)
     if gaps is None:
-        wanted: Observation | list[Gap] = to_gaps(scan(clip))
+        found = scan(clip)
+        wanted: Observation | list[Gap] = to_gaps(found)
         if not wanted:
+            others = sorted({one.kind for one in found})
+            but = f" but what is {', '.join(others)}: see recover and denoise" if others else ""
             raise RequestError(
                 "nothing to fill",
-                "no gaps were given, and a scan finds nothing missing",
+                f"no gaps were given, and a scan finds nothing missing{but}",
                 'Give gaps="120:160".',
             )
     else:

@@ -272,3 +272,13 @@ def test_frames_that_tremble_are_said(cmu_walk):
         assert abs(found[0].start - part.start) < 12
         assert abs(found[0].stop - part.stop) < 12
     assert not [one for one in scan(clip) if one.kind == "noisy"]
+
+
+@pytest.mark.parametrize(("real", "fps"), [(24, 60), (12, 60), (10, 120), (5, 60)])
+def test_motion_in_steps_is_repeated_and_neither_frozen_nor_full_of_jumps(real, fps):
+    clip = motion(seconds=6, fps=real)
+    at = np.arange(6 * fps) * real // fps
+    steps = replace(clip, rotation=clip.rotation[at], translation=clip.translation[at], fps=fps)
+    (found,) = scan(steps)
+    assert found.kind == "repeated"
+    assert f"{real} frames a second" in found.note

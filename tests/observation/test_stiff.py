@@ -78,6 +78,39 @@ def test_what_was_animated_so_is_as_it_should_be(cmu_walk):
     ]
 
 
+@pytest.mark.parametrize("keys", [10, 18])
+def test_half_of_a_clip_that_was_animated_so_is_as_it_should_be(cmu_walk, keys):
+    rotation = cmu_walk.rotation.copy()
+    for start in range(0, 100, keys):
+        ends, share = rotations.continuous(cmu_walk.rotation[[start, start + keys]]), np.arange(keys) / keys
+        rotation[start : start + keys] = rotations.slerp(ends[:1], ends[1:], share[:, None])
+    clip = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    assert not [one for one in scan(clip) if one.kind == "straight"]
+
+
+def test_what_moved_slowly_before_it_was_held_is_real(cmu_walk):
+    """An arm that comes to rest, as far as one sees, and then is held."""
+    slow, rotation = np.radians(0.12), held(cmu_walk, "LeftArm", 0.1).rotation.copy()
+    for joint in below(cmu_walk, "LeftArm"):
+        turn = rotations.exp(np.outer(np.arange(12, 0, -1) * slow, [1.0, 0.0, 0.0]))
+        rotation[START - 12 : START, joint] = rotations.multiply(turn, cmu_walk.rotation[START - 1, joint])
+    found = scan(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    (last,) = [one for one in found if one.kind == "frozen" and one.stop == STOP]
+    assert START - 3 <= last.start <= START + 2
+
+
+@pytest.mark.parametrize("frames", [1, 2, 30])
+def test_what_is_wrong_before_a_motion_makes_it_no_frozen_one(data, frames):
+    """A pose at the beginning that has nothing to do with it: where it leaps from there is no evidence."""
+    from interpose.formats import load
+
+    walk = load(data / "cmu_02_03.bvh")
+    rotation = walk.rotation.copy()
+    rotation[:frames] = walk.skeleton.rest_rotation
+    found = scan(walk.with_motion(rotation, walk.translation))
+    assert not [one for one in found if one.kind == "frozen" and one.stop > frames + 1]
+
+
 def test_people_who_walk_run_and_jump_are_not_stiff(cmu_walk, data):
     from interpose.formats import load
 

@@ -49,6 +49,7 @@ PACE = 0.3
 TELEPORTS, TIMES = 0.1, 5.0
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
+HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
 # Kinds of findings that are no gaps.
 NO_GAPS = ("frozen position", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
 
@@ -122,17 +123,25 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
-        findings += _stiff(clip, findings)
         swapped, names = exchanges(clip), clip.skeleton.names
         findings += [
             Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
             for one in swapped
         ]
         clip = put_back(clip, swapped)
-        findings += _lost(clip, findings)
-        findings += _jumps(clip, known, findings)
-        findings += _repeated(turned, moved, first, clip.fps)
-        if not any(one.kind == "repeated" for one in findings):
+        findings += _stiff(clip, [one for one in findings if one.kind not in ("exchanged", "flipped")])
+        repeated = _repeated(turned, moved, first, clip.fps)
+        for again in repeated:
+            # What stands still for a moment, again and again, is that.
+            brief, near = round(HOLDS * clip.fps), (again.start - 1, again.stop + 1)
+            findings = [
+                one
+                for one in findings
+                if one.kind != "frozen" or len(one) > brief or one.stop < near[0] or one.start > near[1]
+            ]
+        findings += repeated + _lost(clip, findings)
+        if not repeated:
+            findings += _jumps(clip, known, findings)
             findings += _noisy(clip, known)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
@@ -298,7 +307,7 @@ def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Joints that are held with a tremble, or led straight; not what has been found already."""
     names, lost = clip.skeleton.names, _found(clip, findings)
     found = []
-    for joints, start, stop in held(clip):
+    for joints, start, stop in held(clip, lost.copy()):
         if not lost[start:stop, list(joints)].any():
             lost[start:stop, list(joints)] = True
             note = f"hardly moves for {(stop - start) / clip.fps:.2f} s, beside a jump"
@@ -363,9 +372,14 @@ def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> 
     """Frames that are the one before though the body moves: one finding; steps as in `_frozen`."""
     with np.errstate(invalid="ignore"):
         same = np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
-    brief = [run for run in runs(same) if run[1] - run[0] <= REPEATS and run[0] > 0 and run[1] < len(same)]
-    again = sum(stop - start for start, stop in brief)
-    if not brief or again < OFTEN * (brief[-1][1] - brief[0][0]) or len(brief) < MANY:
+    for longest, often in ((REPEATS, OFTEN), (round(HOLDS * fps), MOSTLY)):
+        brief = [
+            run for run in runs(same) if run[1] - run[0] <= longest and run[0] > 0 and run[1] < len(same)
+        ]
+        again = sum(stop - start for start, stop in brief)
+        if len(brief) >= MANY and again >= often * (brief[-1][1] - brief[0][0]):
+            break
+    else:
         return []
     start, stop = brief[0][0], brief[-1][1]
     real = fps * (1 - again / (stop - start))

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
@@ -18,14 +19,18 @@ from interpose.skeletons import JOINTS, find_mapping
 
 # What is held stays within so many radians of where it is in the mean, for at least so many seconds; where
 # one joint alone is held, for longer. It usually goes further than that, by this factor, in the same time.
-# Of 40 limbs of LAFAN1 that are held for half a second to 1.6 s and tremble by .3 degrees 29 are found, 27 at
+# Of 40 limbs of LAFAN1 that are held for half a second to 1.6 s and tremble by .3 degrees 30 are found, 28 at
 # .5 degrees; seven of the others come back within 6 degrees of where they were held. In 532 clips of all
-# sets, 530,000 frames, it finds nine, in five clips, that no one has put there.
+# sets, 530,000 frames, it finds eight, in five clips, that no one has put there.
 HELD, SECONDS, ALONE, USUAL = np.radians(2.0), 0.3, 0.6, 2.0
 # It comes back, or went there, by a step of its own: of so many radians, so many times those beside it.
 LEAP, OWN = np.radians(4.0), 3.0
 WAY, AWAY = 0.02, 1.5  # metres that something goes in that step, and as much further than in those beside
 ALIVE = 0.5  # of what the rest of the body usually turns, at least, meanwhile: who stands still is not held
+# It ends where it stays further from its mean than by so many times what it trembles by in .3 s beside the
+# leap, or by so much (radians): what moved slowly before is real.
+NOISE, SURE = 1.3, np.radians(0.3)
+REAL = 0.2  # seconds that are real on the other side of the leap
 LONGEST = 4.0  # seconds for which what is held is followed
 NEAR = 3  # frames by which joints of one limb may differ
 # Turns from frame to frame are even if each differs from the one before by less than this share (at 30 fps)
@@ -34,13 +39,17 @@ NEAR = 3  # frames by which joints of one limb may differ
 # sets none that no one has put there. Slower turns (radians a second) tell nothing.
 EACH, ALL, SLOW = 0.04, 0.25, 0.09
 BENDS = 3.0  # times what even turns may differ by: before and after them they differ by more
+KEYED = 4  # frames that are straight beyond the frame at an end
 SAME = 1e-5  # radians: files round
 # A joint that turns evenly in more than this share of the frames in which it turns was animated so.
 ANIMATED = 0.3
 
 
-def held(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:
-    """Limbs, or ends of them, that are held and tremble: their joints, and the frames start to stop - 1."""
+def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, int]]:
+    """Limbs, or ends of them, that are held and tremble: their joints, and the frames start to stop - 1.
+
+    lost: (F, J) what is known to be wrong; what leaps from there is real.
+    """
     turned, places, skeleton = rotations.continuous(clip.rotation), clip.positions(), clip.skeleton
     steps = 2.0 * np.linalg.norm(np.diff(turned, axis=0), axis=-1)
     mapping = find_mapping(skeleton)
@@ -50,7 +59,7 @@ def held(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:
         found = [
             (joint, start, stop)
             for joint in limb
-            for start, stop, step in _still(turned[:, joint], steps[:, joint], clip.fps)
+            for start, stop, step in _still(turned[:, joint], steps[:, joint], lost[:, joint], clip.fps)
             if _leaps(places, step, joint, skeleton)
         ]
         while found:
@@ -58,7 +67,7 @@ def held(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:
                 one for one in found if abs(one[1] - found[0][1]) <= NEAR or abs(one[2] - found[0][2]) <= NEAR
             ]
             found = [one for one in found if one not in alike]
-            start, stop = min(one[1] for one in alike), max(one[2] for one in alike)
+            start, stop = (int(np.median([one[side] for one in alike])) for side in (1, 2))
             below = [
                 j for j in range(len(skeleton)) if j == alike[0][0] or alike[0][0] in skeleton.ancestors(j)
             ]
@@ -79,10 +88,13 @@ def _leaps(places: np.ndarray, step: int, joint: int, skeleton: Skeleton) -> boo
     return bool(((ways[at] > WAY) & (ways[at] > AWAY * beside)).any())
 
 
-def _still(turned: np.ndarray, steps: np.ndarray, fps: float) -> Iterator[tuple[int, int, int]]:
+def _still(
+    turned: np.ndarray, steps: np.ndarray, lost: np.ndarray, fps: float
+) -> Iterator[tuple[int, int, int]]:
     """Frames start to stop - 1 in which a joint's rotations (F, 4), turned by `steps` (F - 1) from frame to
-    frame, are held, and the step of its own beside."""
+    frame, are held, and the step of its own beside, on the other side of which it is not lost (F,)."""
     least, longest = max(5, round(SECONDS * fps)), round(LONGEST * fps)
+    real = max(NEAR, round(REAL * fps))
     ways = 2.0 * np.linalg.norm(turned[least:] - turned[:-least], axis=-1)
     if not len(ways) or np.median(ways) < USUAL * HELD:
         return
@@ -90,14 +102,21 @@ def _still(turned: np.ndarray, steps: np.ndarray, fps: float) -> Iterator[tuple[
         beside = np.append(steps[max(0, step - NEAR) : step], steps[step + 1 : step + 1 + NEAR])
         if steps[step] < OWN * beside.max(initial=0.0):
             continue
-        for part, backwards in ((turned[step::-1], True), (turned[step + 1 :], False)):
-            if len(part) < least:
+        for part, other, backwards in (
+            (turned[step::-1], lost[step + 1 :][:real], True),
+            (turned[step + 1 :], lost[max(0, step + 1 - real) : step + 1], False),
+        ):
+            if len(part) < least or len(other) < real or other.any():
                 continue
             off = rotations.angle(rotations.normalize(part[:least].mean(axis=0)), part[:longest])
             length = int(np.argmax(off > HELD)) if (off > HELD).any() else len(off)
-            if length >= least:
-                # The frame before the tracker lost it, or after it was found, is one of them.
-                yield (step + 2 - length, step + 1, step) if backwards else (step + 1, step + length, step)
+            if length < least:
+                continue
+            trembles = max(NOISE * float(np.percentile(off[:least], 90)), SURE)
+            level = ndimage.median_filter(off[:length], 5, mode="nearest")
+            length = max(least, int(np.flatnonzero(level <= trembles).max(initial=0)) + 1)
+            # The frame before the tracker lost it, or after it was found, is one of them.
+            yield (step + 2 - length, step + 1, step) if backwards else (step + 1, step + length, step)
 
 
 def even(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:
@@ -112,17 +131,29 @@ def even(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:
     evenly, least = (changes < limit) & goes, max(6, round(SECONDS * clip.fps))
     # Beside what was put in the motion bends.
     bends = np.pad(changes > BENDS * limit, ((1, 1), (0, 0)), constant_values=True)
+    straight = changes < limit
     found: list[tuple[int, int, int]] = []
     for joint in np.flatnonzero(evenly.sum(axis=0) <= ANIMATED * goes.sum(axis=0)).tolist():
         for start, stop in runs(evenly[:, joint]):
             part = turns[start : stop + 1, joint]
             off = np.linalg.norm(part - part.mean(axis=0), axis=-1).max()
-            straight = off < ALL * np.linalg.norm(part.mean(axis=0))
-            if stop - start >= least - 2 and straight and bends[[start, stop + 1], joint].all():
+            if stop - start < least - 2 or off >= ALL * np.linalg.norm(part.mean(axis=0)):
+                continue
+            # Straight on from the next key, or to it, it was animated so.
+            before, after = (
+                straight[max(0, start - 1 - KEYED) : max(0, start - 1), joint],
+                straight[stop + 1 :, joint],
+            )
+            keyed = any(len(side) == KEYED and side.all() for side in (before, after[:KEYED]))
+            if bends[[start, stop + 1], joint].all() and not keyed:
                 found.append((joint, start + 1, stop + 1))
+    alive = goes.any(axis=0)
     while found:
         alike = [one for one in found if max(abs(one[1] - found[0][1]), abs(one[2] - found[0][2])) <= NEAR]
         found = [one for one in found if one not in alike]
         start, stop = min(one[1] for one in alike), max(one[2] for one in alike)
         if len(alike) > 1 or stop - start >= ALONE * clip.fps:
-            yield tuple(one[0] for one in alike), start, stop
+            # Others that turn too slowly to tell, but as evenly.
+            inside = slice(start + NEAR, stop - 1 - NEAR)
+            also = np.flatnonzero(alive & straight[inside].all(axis=0)).tolist()
+            yield tuple(sorted({*also, *(one[0] for one in alike)})), start, stop
