@@ -282,3 +282,37 @@ def test_motion_in_steps_is_repeated_and_neither_frozen_nor_full_of_jumps(real, 
     (found,) = scan(steps)
     assert found.kind == "repeated"
     assert f"{real} frames a second" in found.note
+
+
+def test_who_stands_still_between_motions_is_still_and_not_lost(cmu_walk):
+    """No jump, and nobody stops dead: a statue, or a rest pose at the beginning. It is said, not filled."""
+    rest = cmu_walk.skeleton.rest_rotation
+    share = np.repeat([0.0, 0.5, 1.0], [30, 30, 30])
+    share[30:60] = (1 - np.cos(np.pi * np.arange(30) / 30)) / 2
+    at = np.where(np.arange(90) < 60, 0, np.arange(90) - 60)
+    ends = rotations.continuous(np.stack([np.broadcast_to(rest, (len(rest), 4)), cmu_walk.rotation[0]]))
+    rotation = rotations.slerp(ends[:1], ends[1:], share[:, None])
+    rotation[60:] = cmu_walk.rotation[:30]
+    translation = cmu_walk.translation[at].copy()
+    translation[:60, 0, 0] += 1e-5 * np.arange(60)[::-1]
+    translation[:30] = translation[30]
+    found = scan(cmu_walk.with_motion(rotation, translation))
+    assert ("still", None) in [(one.kind, one.joints) for one in found]
+    assert not to_gaps(found)
+
+
+def test_a_place_that_is_held_with_a_tremble_is_frozen_until_it_jumps(cmu_walk):
+    translation = cmu_walk.translation.copy()
+    rng = np.random.default_rng(0)
+    translation[60:90] = translation[59] + 0.0005 * rng.standard_normal((30, 1, 3))
+    (found,) = scan(cmu_walk.with_motion(cmu_walk.rotation, translation))
+    assert (found.kind, found.joints, found.stop) == ("frozen position", ("Hips",), 90)
+    assert abs(found.start - 60) <= 1
+
+
+def test_what_jumps_is_what_turns(cmu_walk):
+    """The forearm is elsewhere from one frame to the next because the arm turns."""
+    rotation, arm = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftArm")
+    rotation[100:, arm] = rotations.multiply(rotation[100:, arm], rotations.about("y", np.array(0.9)))
+    found = [one for one in scan(cmu_walk.with_motion(rotation, cmu_walk.translation)) if one.kind == "jump"]
+    assert [(one.joints, one.start) for one in found] == [(("LeftArm",), 100)]

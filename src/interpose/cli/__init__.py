@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # Verbs by group, in the order of the help; `app` finds each in the module of its name.
 VERBS = {
     "Your clips": {
-        "scan": "find what looks missing: frozen runs, stray rest poses",
+        "scan": "find what looks missing: frozen runs, swapped limbs, jumps, noise",
         "fill": "fill gaps; what is not missing comes back unchanged",
         "compare": "see what several methods make of a gap, before one is chosen",
         "between": "generate the motion between key poses",

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from interpose.cli.console import names
 from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, split_names
 from interpose.clip import Clip
@@ -130,19 +131,33 @@ def _scanned(file: Path, clip: Clip) -> Request:
     found = scan(clip)
     gaps = to_gaps(found)
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
-    dropped = [one for one in found if one.kind in ("lost", "exchanged", "flipped")]
+    dropped = [one for one in found if one.kind == "lost"]
+    sides = [one for one in found if one.kind in ("exchanged", "flipped")]
     stuck = [one for one in found if one.kind == "frozen position"]
-    kinds = ["joints that drop out for moments"] * bool(dropped) + ["hips that stand still"] * bool(stuck)
+    others = {
+        "joints that drop out for moments": dropped,
+        "limbs on the wrong side": sides,
+        "hips that stand still": stuck,
+    }
+    kinds = [what for what, some in others.items() if some]
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""
     if not gaps:
-        why = "no --gap is given, and a scan finds nothing missing" + (f" but {left}" if left else "")
-        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck else 0)
+        seen = {one.kind for one in found} & {"jump", "repeated", "noisy", "still"}
+        but = left or (f"what is {', '.join(sorted(seen))}: interpose scan {file} says more" if seen else "")
+        why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
+        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]
-    lines += [f"  {one.start}:{one.stop} {one.kind}, {one.note}" for one in found if one.kind not in NO_GAPS]
-    lines += [f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in stuck]
+    lines += [
+        f"  {one.start}:{one.stop} {one.kind} ({names(one.joints)}), {one.note}"
+        for one in found
+        if one.kind not in NO_GAPS
+    ]
+    lines += [
+        f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in (*stuck, *sides)
+    ]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
-    return Request(gaps, said="\n".join(lines), left=left if stuck else "")
+    return Request(gaps, said="\n".join(lines), left=left if stuck or sides else "")
 
 
 def part_of(

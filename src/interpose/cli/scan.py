@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 from shlex import quote
+from typing import TYPE_CHECKING
 
 from interpose.cli.batch import each
 from interpose.cli.console import names, say, say_json, say_table, seconds
 from interpose.cli.reading import Reading, describe, details
+
+if TYPE_CHECKING:
+    from interpose.clip import Clip
 
 EASED = 0.3  # seconds on either side of a jump that a fill may lead over
 SHOWN = 10  # dropouts, of many
@@ -15,7 +19,11 @@ SHOWN = 10  # dropouts, of many
 
 @each
 def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
-    """Find what looks missing: frozen runs, stray rest poses, joints that drop out for moments.
+    """Find what looks missing or wrong: frozen runs, stray rest poses, joints that drop out, swapped limbs.
+
+    Also limbs that are held with a tremble, joints that were led straight (what was
+    eased or splined over looks like motion), jumps, noise, and frames that are there
+    twice. It says which verb mends what.
 
     Try:
       interpose scan take.bvh
@@ -73,9 +81,19 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     if jumps:
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))
         gap = f"{max(first - room, 1)}:{min(first + room, len(clip) - 1)}"
-        say(f"interpose fill {quote(str(file))} --gap {gap} leads over the first jump.")
+        said = f"interpose fill {quote(str(file))} --gap {gap}"
+        if jumps[0].joints is not None:
+            said += f" --joints {quote(','.join(_with_below(clip, jumps[0].joints)))}"
+        say(f"{said} leads over the first jump.")
         if jumps[0].joints is None:
             halves = " ".join(quote(f"{file}#{part}") for part in (f":{first}", f"{first}:"))
             say(f"interpose stitch {halves} --frames 2 puts what follows where the body was.")
     if any(one.kind == "frozen position" for one in found) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")
+
+
+def _with_below(clip: Clip, joints: tuple[str, ...]) -> list[str]:
+    """Joints, and all that hangs from them."""
+    skeleton = clip.skeleton
+    top = {skeleton.index(name) for name in joints}
+    return [name for j, name in enumerate(skeleton.names) if top & {j, *skeleton.ancestors(j)}]

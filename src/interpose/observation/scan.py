@@ -44,6 +44,7 @@ OUTLIER = 0.05
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 # Metres a second from which no body comes to stand, to the last digit, from one frame to the next.
 PACE = 0.3
+HELD = 0.01  # metres within which a place is held with a tremble
 # A joint, against the hips, or the hips themselves go further than this (metres) from one frame to the next,
 # and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
 TELEPORTS, TIMES = 0.1, 5.0
@@ -51,7 +52,7 @@ TELEPORTS, TIMES = 0.1, 5.0
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
 # Kinds of findings that are no gaps.
-NO_GAPS = ("frozen position", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
+NO_GAPS = ("still", "frozen position", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
 
 
 @dataclass(frozen=True)
@@ -59,7 +60,7 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "frozen position", "straight", "rest pose", "outlier", "lost",
+        kind: "missing", "frozen", "still", "frozen position", "straight", "rest pose", "outlier", "lost",
             "exchanged", "flipped", "jump", "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
@@ -87,10 +88,11 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       for at least .1 s (and 3 frames) with a jump at one end; or for a second in which the joint would
       usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
       write it as their rest pose. When everything that moves stands still at once, the root's position
-      included, it is one finding of the whole pose, jump or not; of all joints that turn, when the position
-      goes on.
+      included, it is one finding of the whole pose; of all joints that turn, when the position goes on.
       A limb, or its end, that hardly moves for .3 s (a joint alone for .6 s) and then is elsewhere from one
       frame to the next is frozen, too: trackers hold what they lose with the noise of what they see.
+    - "still": a whole pose that stands still without a jump at either end, and that is not met or left at a
+      pace of .3 m/s: a statue, or a rest pose at the beginning. Nothing is missing.
     - "straight": joints that turn evenly for .3 s, as other programs interpolate; more than a third of all
       that move are the whole pose. Not those that do so in much of the clip: they were animated so.
     - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
@@ -123,6 +125,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
         turned, moved = turned[first : last - 1], moved[first : last - 1]
         findings += _frozen(clip, turned, moved, first)
         findings += _dead(clip, turned)
+        findings += _held_place(clip, findings)
         swapped, names = exchanges(clip), clip.skeleton.names
         findings += [
             Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
@@ -137,7 +140,10 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
             findings = [
                 one
                 for one in findings
-                if one.kind != "frozen" or len(one) > brief or one.stop < near[0] or one.start > near[1]
+                if one.kind not in ("frozen", "still")
+                or len(one) > brief
+                or one.stop < near[0]
+                or one.start > near[1]
             ]
         findings += repeated + _lost(clip, findings)
         if not repeated:
@@ -161,7 +167,7 @@ def stuck(clip: Clip) -> list[Finding]:
     odd = {one.start for one in _strays(clip, turned)}
     first, last = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
     found = _frozen(clip, turned[first : last - 1], moved[first : last - 1], first)
-    return [one for one in found if one.kind == "frozen position"]
+    return [one for one in found if one.kind == "frozen position"] + _held_place(clip, found)
 
 
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
@@ -249,13 +255,19 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         begin = run.start + (0 if run.jumps_in or run.start == 0 else 1)
         end = run.stop + (0 if run.start == 0 and not run.jumps_out else 1)
         what = "the position stands" if kind == "frozen position" else "nothing moves"
-        seconds = (run.stop - run.start) / clip.fps
-        found.append(Finding(kind, joints, first + begin, first + end, f"{what} for {seconds:.2f} s"))
+        note = f"{what} for {(run.stop - run.start) / clip.fps:.2f} s"
+        note += ", and comes to rest and sets off by itself" if kind == "still" else ""
+        found.append(Finding(kind, joints, first + begin, first + end, note))
 
     whole = np.asarray(still[:, alive].all(axis=1) & stopped[:, walking].all(axis=1))
     for run in _runs(whole, turned[:, alive].max(axis=1), JUMP_TURN):
         if run.stop - run.start >= shortest:
-            add("frozen", None, run)
+            begin, end = first + run.start, first + run.stop
+            rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin]) < LIFELESS
+            # Who stands in the rest pose does so to be measured.
+            calm = rests.mean() > 0.5 or _pace_beside(clip, begin, end) <= PACE
+            lost = run.jumps_in or run.jumps_out or not calm
+            add("frozen" if lost else "still", None, run)
 
     # Joints without data but for some steps, like the fingers of many files, are left out.
     lively = [joint for joint in alive.tolist() if _lively(still[:, joint] & ~whole, still[:, joint])]
@@ -285,6 +297,36 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
             if stopped_dead or _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[placed(clip)[column]],), run)
     return found
+
+
+def _held_place(clip: Clip, findings: list[Finding]) -> list[Finding]:
+    """A body whose place is held with a tremble while it turns, and then is elsewhere; not what has been
+    found already."""
+    where, found = placed(clip)[-1], []
+    places = clip.translation[:, clip.translated.index(where)]
+    steps, shortest = np.linalg.norm(np.diff(places, axis=0), axis=-1), max(3, round(SHORTEST * clip.fps))
+    beside = ndimage.maximum_filter(steps, footprint=[1, 1, 1, 0, 1, 1, 1], mode="nearest")
+    lost = _found(clip, findings)[:, where]
+    for step in np.flatnonzero((steps > TELEPORTS) & (steps > TIMES * beside)).tolist():
+        far = np.linalg.norm(places[step::-1] - places[step], axis=-1)
+        start = step + 2 - (int(np.argmax(far > HELD)) if (far > HELD).any() else len(far))
+        pace = np.linalg.norm(np.diff(places[max(0, start - 4) : start], axis=0), axis=-1) * clip.fps
+        stops = len(pace) > 0 and float(np.median(pace)) > PACE
+        if step + 1 - start >= shortest and stops and not lost[start : step + 2].any():
+            note = f"the position hardly moves for {(step + 1 - start) / clip.fps:.2f} s, and then jumps"
+            found.append(Finding("frozen position", (clip.skeleton.names[where],), start, step + 1, note))
+    return found
+
+
+def _pace_beside(clip: Clip, start: int, stop: int) -> float:
+    """Metres a second, in the mean over all joints: how fast a body is right before frame `start`, or after
+    `stop`, whichever is more."""
+    paces = [
+        float(np.linalg.norm(np.diff(clip.slice(a, a + 2).positions(), axis=0), axis=-1).mean() * clip.fps)
+        for a in (start - 1, stop)
+        if 0 <= a < len(clip) - 1
+    ]
+    return max(paces, default=0.0)
 
 
 def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
@@ -363,7 +405,7 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         way = float(steps[step, hips] if jumps[step, hips] else steps[step, joint])
         speed = f"{way:.2f} m further from one frame to the next, {way * clip.fps:.0f} m/s"
         what = "the body is" if jumps[step, hips] else f"{clip.skeleton.names[joint]} is"
-        joints = None if jumps[step, hips] else _topmost(clip, np.flatnonzero(jumps[step]).tolist())
+        joints = None if jumps[step, hips] else _turning(clip, np.flatnonzero(jumps[step]).tolist())
         found.append(Finding("jump", joints, step + 1, step + 2, f"{what} {speed}"))
     return found
 
@@ -401,10 +443,13 @@ def _noisy(clip: Clip, known: Observation) -> list[Finding]:
     ]
 
 
-def _topmost(clip: Clip, joints: list[int]) -> tuple[str, ...]:
-    """The names of joints that hang from none of the others."""
-    above = [{*clip.skeleton.ancestors(joint)} & {*joints} for joint in joints]
-    return tuple(clip.skeleton.names[joint] for joint, some in zip(joints, above) if not some)
+def _turning(clip: Clip, joints: list[int]) -> tuple[str, ...]:
+    """The names of the joints that jump themselves, where `joints` are elsewhere: what those hang from, of
+    those that hang from none of the others."""
+    skeleton = clip.skeleton
+    top = [joint for joint in joints if not {*skeleton.ancestors(joint)} & {*joints}]
+    turned = dict.fromkeys(max(skeleton.parents[joint], 0) for joint in top)
+    return tuple(skeleton.names[joint] for joint in turned)
 
 
 def _lively(paused: np.ndarray, still: np.ndarray) -> bool:

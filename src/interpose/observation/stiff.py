@@ -40,9 +40,9 @@ NEAR = 3  # frames by which joints of one limb may differ
 EACH, ALL, SLOW = 0.04, 0.25, 0.09
 BENDS = 3.0  # times what even turns may differ by: before and after them they differ by more
 KEYED = 4  # frames that are straight beyond the frame at an end
-SAME = 1e-5  # radians: files round
+SAME = 1.5e-4  # radians: files round
 # A joint that turns evenly in more than this share of the frames in which it turns was animated so.
-ANIMATED = 0.3
+ANIMATED = 0.7
 
 
 def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, int]]:
