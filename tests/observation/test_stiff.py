@@ -99,6 +99,23 @@ def test_what_moved_slowly_before_it_was_held_is_real(cmu_walk):
     assert START - 3 <= last.start <= START + 2
 
 
+def test_a_pose_that_is_held_whole_is_one_gap(cmu_walk):
+    """The tracker lost all of it: turns tremble, and the place is held to the last digit."""
+    rng, rotation, translation = (
+        np.random.default_rng(0),
+        cmu_walk.rotation.copy(),
+        cmu_walk.translation.copy(),
+    )
+    moving = np.ptp(cmu_walk.rotation, axis=0).max(axis=1) > 1e-3
+    noise = rotations.exp(np.radians(0.1) * rng.standard_normal((STOP - START, int(moving.sum()), 3)))
+    rotation[START:STOP] = rotation[START - 1]
+    rotation[START:STOP, moving] = rotations.multiply(noise, rotation[START - 1, moving])
+    translation[START:STOP] = translation[START - 1]
+    (found,) = scan(cmu_walk.with_motion(rotation, translation))
+    assert (found.kind, found.joints, found.stop) == ("frozen", None, STOP)
+    assert abs(found.start - START) <= 3
+
+
 @pytest.mark.parametrize("frames", [1, 2, 30])
 def test_what_is_wrong_before_a_motion_makes_it_no_frozen_one(data, frames):
     """A pose at the beginning that has nothing to do with it: where it leaps from there is no evidence."""

@@ -132,7 +132,17 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
             for one in swapped
         ]
         clip = put_back(clip, swapped)
-        findings += _stiff(clip, [one for one in findings if one.kind not in ("exchanged", "flipped")])
+        stiff = _stiff(clip, [one for one in findings if one.kind not in NO_GAPS])
+        for whole in [one for one in stiff if one.joints is None]:
+            # The place is held as all else is.
+            findings = [
+                one
+                for one in findings
+                if one.kind != "frozen position"
+                or one.start < whole.start - MANY
+                or one.stop > whole.stop + MANY
+            ]
+        findings += stiff
         repeated = _repeated(turned, moved, first, clip.fps)
         for again in repeated:
             # What stands still for a moment, again and again, is that.
@@ -353,7 +363,8 @@ def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
         if not lost[start:stop, list(joints)].any():
             lost[start:stop, list(joints)] = True
             note = f"hardly moves for {(stop - start) / clip.fps:.2f} s, beside a jump"
-            found.append(Finding("frozen", tuple(names[joint] for joint in joints), start, stop, note))
+            some = None if len(joints) == len(names) else tuple(names[joint] for joint in joints)
+            found.append(Finding("frozen", some, start, stop, note))
     moving = (np.ptp(clip.rotation, axis=0).max(axis=1) > LIFELESS).sum()
     for joints, start, stop in even(clip):
         if not lost[start:stop, list(joints)].any():

@@ -19,13 +19,16 @@ from interpose.skeletons import JOINTS, find_mapping
 
 # What is held stays within so many radians of where it is in the mean, for at least so many seconds; where
 # one joint alone is held, for longer. It usually goes further than that, by this factor, in the same time.
-# Of 40 limbs of LAFAN1 that are held for half a second to 1.6 s and tremble by .3 degrees 30 are found, 28 at
+# Of 40 limbs of LAFAN1 that are held for half a second to 1.6 s and tremble by .3 degrees 31 are found, 29 at
 # .5 degrees; seven of the others come back within 6 degrees of where they were held. In 532 clips of all
-# sets, 530,000 frames, it finds eight, in five clips, that no one has put there.
+# sets, 530,000 frames, it finds ten, in seven clips, that no one has put there.
 HELD, SECONDS, ALONE, USUAL = np.radians(2.0), 0.3, 0.6, 2.0
 # It comes back, or went there, by a step of its own: of so many radians, so many times those beside it.
-LEAP, OWN = np.radians(4.0), 3.0
+LEAP, OWN = np.radians(4.0), 2.0
 WAY, AWAY = 0.02, 1.5  # metres that something goes in that step, and as much further than in those beside
+# So many limbs, and such a share of all joints, are all of the pose, of a body that went so fast before (in
+# metres a second).
+MOST, NEARLY, PACE = 3, 0.9, 0.3
 ALIVE = 0.5  # of what the rest of the body usually turns, at least, meanwhile: who stands still is not held
 # It ends where it stays further from its mean than by so many times what it trembles by in .3 s beside the
 # leap, or by so much (radians): what moved slowly before is real.
@@ -53,6 +56,7 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
     turned, places, skeleton = rotations.continuous(clip.rotation), clip.positions(), clip.skeleton
     steps = 2.0 * np.linalg.norm(np.diff(turned, axis=0), axis=-1)
     mapping = find_mapping(skeleton)
+    groups: list[tuple[tuple[int, ...], int, int]] = []
     for rows in LIMBS:
         joints = [mapping.joints[row] for row in rows if not JOINTS[row].endswith("Toe")]
         limb = [joint for joint in joints if joint is not None]
@@ -71,10 +75,28 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
             below = [
                 j for j in range(len(skeleton)) if j == alike[0][0] or alike[0][0] in skeleton.ancestors(j)
             ]
+            if len({one[0] for one in alike}) > 1 or stop - start >= ALONE * clip.fps:
+                groups.append((tuple(below), start, stop))
+    while groups:
+        _, start, stop = groups[0]
+        same = [one for one in groups if max(abs(one[1] - start), abs(one[2] - stop)) <= NEAR]
+        groups = [one for one in groups if one not in same]
+        if len(same) >= MOST and _whole(turned[start:stop]):
+            before = np.linalg.norm(np.diff(places[max(0, start - NEAR) : start], axis=0), axis=-1) * clip.fps
+            # The tracker lost all of it, amid motion. Who stood still before did so.
+            if before.size and before.mean() > PACE:
+                yield tuple(range(len(skeleton))), start, stop
+            continue
+        for below, start, stop in same:
             alive = np.delete(steps, below, axis=1).mean(axis=1)
-            many = len({one[0] for one in alike}) > 1 or stop - start >= ALONE * clip.fps
-            if many and np.median(alive[start:stop]) > ALIVE * np.median(alive):
-                yield tuple(below), start, stop
+            if np.median(alive[start:stop]) > ALIVE * np.median(alive):
+                yield below, start, stop
+
+
+def _whole(turned: np.ndarray) -> bool:
+    """Whether nearly all joints are held in frames with rotations (F, J, 4)."""
+    off = rotations.angle(rotations.normalize(turned.mean(axis=0)), turned)
+    return bool((np.percentile(off, 90, axis=0) < HELD).mean() > NEARLY)
 
 
 def _leaps(places: np.ndarray, step: int, joint: int, skeleton: Skeleton) -> bool:
