@@ -87,10 +87,10 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
             if before.size and before.mean() > PACE:
                 yield tuple(range(len(skeleton))), start, stop
             continue
-        for below, start, stop in same:
-            alive = np.delete(steps, below, axis=1).mean(axis=1)
+        for part, start, stop in same:
+            alive = np.delete(steps, part, axis=1).mean(axis=1)
             if np.median(alive[start:stop]) > ALIVE * np.median(alive):
-                yield below, start, stop
+                yield part, start, stop
 
 
 def _whole(turned: np.ndarray) -> bool:
