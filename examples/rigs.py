@@ -21,11 +21,12 @@ from interpose.show import Take, strip
 from interpose.show.sheet import sheet
 from interpose.skeletons import JOINTS, find_humanoid, find_mapping
 
+BANDAI = "bandai/Bandai-Namco-Research-Motiondataset-1/data/dataset-1_walk_normal_001.bvh"
 TRIAL, SHOWN = "49/49_02.bvh", (30, 120)
 RIGS = {
-    "with fingers": resources.files("interpose") / "examples" / "fingers.bvh",
-    "LAFAN1": "lafan1/bvh/walk3_subject5.bvh",
-    "Bandai-Namco": "bandai/Bandai-Namco-Research-Motiondataset-1/data/dataset-1_walk_normal_001.bvh",
+    "a rig with fingers": resources.files("interpose") / "examples" / "fingers.bvh",
+    "the rig of LAFAN1": "lafan1/bvh/walk3_subject5.bvh",
+    "the rig of Bandai-Namco": BANDAI,
 }
 TOES = [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]
 STANDS = 0.05  # metres a second
@@ -49,8 +50,8 @@ def main() -> None:
     clip = resample(clip.slice(1, len(clip)), 30)
     stands = speeds(clip) < STANDS
     mapped = list(find_mapping(clip.skeleton).mapped[1])
-    made = {"CMU": clip}
-    print(f"CMU: {100 * speeds(clip)[stands].mean():.1f} cm/s")
+    made = {"its own rig": clip}
+    print(f"its own rig: {100 * speeds(clip)[stands].mean():.1f} cm/s")
     for name, file in RIGS.items():
         made[name] = interpose.retarget(clip, interpose.load(Path(str(given.data / str(file)))))
         back = interpose.retarget(made[name], clip).positions() - clip.positions()
@@ -62,11 +63,7 @@ def main() -> None:
             parents(one),
             one.fps,
             [interpose.Gap(0, len(one))],
-            title="CMU 49_02"
-            if one is clip
-            else f"on the rig {name}"
-            if " " in name
-            else f"on the rig of {name}",
+            title=f"CMU 49_02 on {name}",
             count=10,
             span=SHOWN,
         )

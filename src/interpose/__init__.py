@@ -156,7 +156,7 @@ def fill(
         wanted: Observation | list[Gap] = to_gaps(found)
         if not wanted:
             others = sorted({one.kind for one in found})
-            but = f" but what is {', '.join(others)}: see recover and denoise" if others else ""
+            but = f" but what is {', '.join(others)}, as scan(clip) says" if others else ""
             raise RequestError(
                 "nothing to fill",
                 f"no gaps were given, and a scan finds nothing missing{but}",
@@ -364,18 +364,18 @@ def stitch(
 def retarget(clip: Clip | str | Path, like: Clip | str | Path) -> Clip:
     """The motion of one humanoid on the skeleton of another one.
 
-    Joints are turned from their T-pose as the other body's are; ways and heights go by the legs' lengths, and
-    feet that stand still stand still.
+    Joints are turned from their T-pose as the other body's are; ways and heights go by the legs' lengths,
+    floors are at height 0, and feet that stand still stand still. Clips of one rig keep their own rotations.
 
     Args:
         clip: the motion, a clip or a path.
-        like: a clip or a path: the skeleton, the layout of its file, and where its floor is.
+        like: a clip or a path: the skeleton, and the layout of its file.
 
     Returns:
         As many frames as `clip` has, at its rate. `save` writes them in the layout of `like`.
 
     Raises:
-        RequestError: one of the skeletons is no humanoid, or its T-pose cannot be found.
+        RequestError: the rigs differ, and one is no humanoid, has no frames, or has no T-pose to be found.
         FileError: a file cannot be read.
     """
     from interpose import finish

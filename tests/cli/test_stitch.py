@@ -122,3 +122,18 @@ def test_what_jumped_is_put_where_the_body_was(run, takes):
     made = load(takes / "jumps.stitched.bvh")
     assert len(made) == len(walk) + 2
     assert np.linalg.norm(made.root[102] - walk.root[100]) < 0.1
+
+
+def test_a_rest_pose_that_is_stitched_in_is_said(run, takes):
+    """Files of CMU's library begin with one; what the note says instead leaves it out."""
+    jump = load(takes / "jump.bvh")
+    rotation = jump.rotation.copy()
+    rotation[0] = jump.skeleton.rest_rotation
+    save(jump.with_motion(rotation, jump.translation), takes / "raw.bvh")
+    done = run("stitch", "walk.bvh", "raw.bvh", "--frames", "9")
+    (note,) = [line for line in done.out.splitlines() if "nothing to do with the rest" in line]
+    better = note.split(": ")[-1].split()[0]
+    assert better.startswith("raw.bvh#1:")
+    again = run("stitch", "walk.bvh", better, "--frames", "9", "--force")
+    assert again.code == 0
+    assert "nothing to do with the rest" not in again.out

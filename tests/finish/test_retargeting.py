@@ -139,3 +139,11 @@ def test_a_left_handed_rig_moves_as_well(cmu_walk, hands):
     left = replace(mirrored, skeleton=skeleton)
     there, right = retarget(cmu_walk, left), retarget(cmu_walk, hands)
     assert np.allclose(there.positions() * [-1.0, 1.0, 1.0], right.positions(), atol=1e-6)
+
+
+def test_clips_without_frames_are_refused(cmu_walk, hands):
+    for clip, like in ((cmu_walk.slice(0, 0), hands), (cmu_walk, hands.slice(0, 0))):
+        with pytest.raises(RequestError, match="another rig") as caught:
+            retarget(clip, like)
+        assert "no frames" in caught.value.why
+    assert len(retarget(cmu_walk.slice(0, 1), hands.slice(0, 1))) == 1

@@ -113,7 +113,7 @@ def _blocked(
     from interpose import tasks
     from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
-    from interpose.observation.timeline import Placement, bounded, fit, joined, other_rig, plausible_length
+    from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
     from interpose.skeletons.carrier import hips_of
 
     met_at = [_met(text) for text in anchors]
@@ -121,9 +121,9 @@ def _blocked(
     file = named[0][0]
     loaded = reading.load_all([path for path, _ in named])
     before = loaded[0]
-    others = {path: other_rig(clip, before) is not None for (path, _), clip in zip(named[1:], loaded[1:])}
-    said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
     clips = [before, *(on_rig_of(clip, before) for clip in loaded[1:])]
+    others = {path: clip is not own for (path, _), clip, own in zip(named[1:], clips[1:], loaded[1:])}
+    said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
     at = [
         _moment(path, frame, clip, -1 if k == 0 else 0)
         for k, ((path, frame), clip) in enumerate(zip(named, clips))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from interpose.cli.console import names, progress, say, say_json, say_table, seconds
+from interpose.cli.console import figure, names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import UNITS, write_text
 from interpose.cli.reading import Reading, describe, details, split_names
 from interpose.errors import RequestError
@@ -136,9 +136,6 @@ def _check(page: Path, force: bool) -> None:
 
 
 def _row(one: GapReport, name: str, auto: bool, fps: float) -> list[str]:
-    def figure(value: float | None, digits: int = 2) -> str:
-        return "" if value is None else f"{value:.{digits}f}"
-
     stood_in = f" (by {one.method})" if one.method != name and one.model != name else ""
     return [
         str(one.number),

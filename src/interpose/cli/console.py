@@ -85,6 +85,11 @@ def names(joints: Sequence[str] | None, most: int = 4) -> str:
     return shown + (f" +{len(joints) - most}" if len(joints) > most else "")
 
 
+def figure(value: float | None, digits: int = 2) -> str:
+    """A number in a table; nothing where there is none."""
+    return "" if value is None else f"{value:.{digits}f}"
+
+
 @contextmanager
 def progress(what: str, frames: int) -> Iterator[Callable[[float], None] | None]:
     """Shows how far long work has got: a bar in a terminal, one plain line elsewhere; None for short work.

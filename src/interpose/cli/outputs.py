@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from interpose import __version__
-from interpose.cli.console import names, say, say_json, say_table, seconds
+from interpose.cli.console import figure, names, say, say_json, say_table, seconds
 from interpose.cli.reading import describe, details
 from interpose.errors import FileError, RequestError
 
@@ -283,9 +283,6 @@ def _legend(gaps: list[GapReport]) -> Iterator[str]:
 
 
 def _row(gap: GapReport, fps: float) -> list[str]:
-    def figure(value: float | None, digits: int = 2) -> str:
-        return "" if value is None else f"{value:.{digits}f}"
-
     joints = "" if gap.joints is None else names(gap.joints, most=2)
     return [
         str(gap.number),

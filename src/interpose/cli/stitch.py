@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -119,7 +119,7 @@ def stitch(
     print_report(done, done.clip.fps, {})
     others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
     rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
-    said = [f"note: {note}" for note in (*rigs, *notes)]
+    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *notes)]
     say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
 
@@ -152,6 +152,19 @@ def _part(file: Path, whole: Clip, part: str) -> Clip:
         raise RequestError(f"there are no frames {part} in {file}", why, f"Choose some of 0:{len(whole)}.")
     chosen = slice(span.start, span.stop)
     return whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
+
+
+def _odd(pieces: list[Piece]) -> Iterator[str]:
+    """Pieces whose first or last frame is a rest pose, or another that has nothing to do with the rest."""
+    from interpose.observation.scan import strays
+
+    for piece in pieces:
+        if odd := strays(piece.clip):
+            first, last = int(0 in odd), len(piece.clip) - int(len(piece.clip) - 1 in odd)
+            start = 0 if piece.part is None else Gap.parse(piece.part, clip=piece.whole).start
+            better = f"{piece.file}#{start + first}:{start + last}"
+            what = "begins" if first else "ends"
+            yield f"{piece} {what} with a frame that has nothing to do with the rest: {better} leaves it out"
 
 
 def _fitted(piece: Piece, first: Clip) -> Piece:

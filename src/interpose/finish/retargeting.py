@@ -17,18 +17,19 @@ from interpose.finish import measures
 from interpose.finish.feet import Leg, legs, reach
 from interpose.finish.windows import rounded, spread
 from interpose.geometry import rotations
+from interpose.methods.bodies import RESTS
 from interpose.observation.timeline import fit, joined, other_rig
 from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping
 from interpose.skeletons.carrier import rooted
+from interpose.skeletons.humanoid import SHORT
 
-# Metres, of a body with the canonical leg: toes rest so high over the floor, as a rule, and as far from there
-# in one rig or another. Stances tell it: toes slower than this (metres a second), for so many seconds.
-RESTS, LEVEL, SLOW, SECONDS = 0.03, 0.05, 0.15, 0.3
+# Metres, of a body with the canonical leg: so far from RESTS do toes rest in one rig or another. Stances tell
+# it: toes slower than this (metres a second), for so many seconds.
+LEVEL, SLOW, SECONDS = 0.05, 0.15, 0.3
 # The share of its length to which a leg may be stretched (or as far as it is already) before the hips sink;
 # the bound is rounded off by the second (metres), and comes and goes over so many seconds.
 TAUT, ROUND, OVER = 0.98, 0.005, 0.15
 NECK, HEAD = JOINTS.index("Neck"), JOINTS.index("Head")
-SHORT = 0.01  # metres: what a shorter bone points at means nothing
 
 
 def retarget(clip: Clip, like: Clip) -> Clip:
@@ -69,6 +70,9 @@ def on_rig_of(clip: Clip, like: Clip) -> Clip:
                 f" onto other rigs: nothing was found for {', '.join(lacking)}",
                 "Name its joints with --map, or use clips of one rig.",
             )
+        if not len(one):
+            what = f"cannot bring {clip.name or 'a clip'} onto another rig"
+            raise RequestError(what, f"{one.name or 'one of them'} has no frames", "Take others.")
     return _brought(clip, like)
 
 

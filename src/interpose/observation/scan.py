@@ -15,7 +15,7 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
-from interpose.observation.stiff import even, held
+from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -42,12 +42,6 @@ OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
 # decimals stand still for long.
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
-# Metres a second from which no body comes to stand, to the last digit, from one frame to the next.
-PACE = 0.3
-HELD = 0.01  # metres within which a place is held with a tremble
-# A joint, against the hips, or the hips themselves go further than this (metres) from one frame to the next,
-# and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
-TELEPORTS, TIMES = 0.1, 5.0
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
@@ -310,22 +304,19 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
 
 
 def _held_place(clip: Clip, findings: list[Finding]) -> list[Finding]:
-    """A body whose place is held with a tremble while it turns, and then is elsewhere; not what has been
-    found already."""
-    where, found = placed(clip)[-1], []
-    places = clip.translation[:, clip.translated.index(where)]
-    steps, shortest = np.linalg.norm(np.diff(places, axis=0), axis=-1), max(3, round(SHORTEST * clip.fps))
-    beside = ndimage.maximum_filter(steps, footprint=[1, 1, 1, 0, 1, 1, 1], mode="nearest")
-    lost = _found(clip, findings)[:, where]
-    for step in np.flatnonzero((steps > TELEPORTS) & (steps > TIMES * beside)).tolist():
-        far = np.linalg.norm(places[step::-1] - places[step], axis=-1)
-        start = step + 2 - (int(np.argmax(far > HELD)) if (far > HELD).any() else len(far))
-        pace = np.linalg.norm(np.diff(places[max(0, start - 4) : start], axis=0), axis=-1) * clip.fps
-        stops = len(pace) > 0 and float(np.median(pace)) > PACE
-        if step + 1 - start >= shortest and stops and not lost[start : step + 2].any():
-            note = f"the position hardly moves for {(step + 1 - start) / clip.fps:.2f} s, and then jumps"
-            found.append(Finding("frozen position", (clip.skeleton.names[where],), start, step + 1, note))
-    return found
+    """A body whose place is held with a tremble; not what has been found already."""
+    lost = _found(clip, findings)
+    return [
+        Finding(
+            "frozen position",
+            (clip.skeleton.names[joint],),
+            start,
+            stop,
+            f"the position hardly moves for {(stop - start) / clip.fps:.2f} s, and then jumps",
+        )
+        for joint, start, stop in held_place(clip)
+        if not lost[start : stop + 1, joint].any()
+    ]
 
 
 def _pace_beside(clip: Clip, start: int, stop: int) -> float:

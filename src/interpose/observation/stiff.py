@@ -16,6 +16,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons.carrier import placed
 
 # What is held stays within so many radians of where it is in the mean, for at least so many seconds; where
 # one joint alone is held, for longer. It usually goes further than that, by this factor, in the same time.
@@ -26,9 +27,13 @@ HELD, SECONDS, ALONE, USUAL = np.radians(2.0), 0.3, 0.6, 2.0
 # It comes back, or went there, by a step of its own: of so many radians, so many times those beside it.
 LEAP, OWN = np.radians(4.0), 2.0
 WAY, AWAY = 0.02, 1.5  # metres that something goes in that step, and as much further than in those beside
-# So many limbs, and such a share of all joints, are all of the pose, of a body that went so fast before (in
-# metres a second).
-MOST, NEARLY, PACE = 3, 0.9, 0.3
+# Metres a second from which no body comes to stand, to the last digit, from one frame to the next.
+PACE = 0.3
+MOST, NEARLY = 3, 0.9  # so many limbs, and such a share of all joints, are all of the pose
+# A joint, against the hips, or the hips themselves go further than this (metres) from one frame to the next,
+# and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
+TELEPORTS, TIMES = 0.1, 5.0
+PLACE, BRIEF = 0.01, 0.1  # metres within which a place is held with a tremble, and seconds for which at least
 ALIVE = 0.5  # of what the rest of the body usually turns, at least, meanwhile: who stands still is not held
 # It ends where it stays further from its mean than by so many times what it trembles by in .3 s beside the
 # leap, or by so much (radians): what moved slowly before is real.
@@ -91,6 +96,21 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
             alive = np.delete(steps, part, axis=1).mean(axis=1)
             if np.median(alive[start:stop]) > ALIVE * np.median(alive):
                 yield part, start, stop
+
+
+def held_place(clip: Clip) -> Iterator[tuple[int, int, int]]:
+    """Where the place of a body is held with a tremble and then is elsewhere: the joint, and the frames start
+    to stop - 1. It stops there from a pace at which nobody comes to stand at once."""
+    where, least = placed(clip)[-1], max(NEAR, round(BRIEF * clip.fps))
+    places = clip.translation[:, clip.translated.index(where)]
+    steps = np.linalg.norm(np.diff(places, axis=0), axis=-1)
+    beside = ndimage.maximum_filter(steps, footprint=[1, 1, 1, 0, 1, 1, 1], mode="nearest")
+    for step in np.flatnonzero((steps > TELEPORTS) & (steps > TIMES * beside)).tolist():
+        far = np.linalg.norm(places[step::-1] - places[step], axis=-1) > PLACE
+        start = step + 2 - (int(np.argmax(far)) if far.any() else len(far))
+        pace = steps[max(0, start - 4) : max(0, start - 1)] * clip.fps
+        if step + 1 - start >= least and len(pace) and np.median(pace) > PACE:
+            yield where, start, step + 1
 
 
 def _whole(turned: np.ndarray) -> bool:
