@@ -21,9 +21,8 @@ SHOWN = 10  # dropouts, of many
 def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
     """Find what looks missing or wrong: frozen runs, stray rest poses, joints that drop out, swapped limbs.
 
-    Also limbs that are held with a tremble, joints that were led straight (what was
-    eased or splined over looks like motion), jumps, noise, and frames that are there
-    twice. It says which verb mends what.
+    Also limbs that are held with a tremble, joints that another program led straight or
+    splined, jumps, noise, and frames that are there twice. It says which verb mends what.
 
     Try:
       interpose scan take.bvh
@@ -71,6 +70,10 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     say()
     if to_gaps(found):
         say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
+    if led := [one for one in found if one.kind == "splined"]:
+        part = "" if led[0].joints is None else f" --joints {quote(','.join(led[0].joints))}"
+        gap = f"--gap {led[0].start}:{led[0].stop}{part}"
+        say(f"interpose fill {quote(str(file))} {gap} fills anew what is splined first.")
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
     if any(one.kind in ("exchanged", "flipped") for one in found):

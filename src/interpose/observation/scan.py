@@ -15,6 +15,7 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import broken
 from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
+from interpose.observation.splined import splined
 from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
@@ -46,7 +47,7 @@ EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
 # Kinds of findings that are no gaps.
-NO_GAPS = ("still", "frozen position", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
+NO_GAPS = ("still", "frozen position", "splined", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
 
 
 @dataclass(frozen=True)
@@ -54,8 +55,8 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "still", "frozen position", "straight", "rest pose", "outlier", "lost",
-            "exchanged", "flipped", "jump", "repeated" or "noisy".
+        kind: "missing", "frozen", "still", "frozen position", "straight", "splined", "rest pose", "outlier",
+            "lost", "exchanged", "flipped", "jump", "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -89,6 +90,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       pace of .3 m/s: a statue, or a rest pose at the beginning. Nothing is missing.
     - "straight": joints that turn evenly for .3 s, as other programs interpolate; more than a third of all
       that move are the whole pose. Not those that do so in much of the clip: they were animated so.
+    - "splined": joints that turn for .4 s along a curve smoother than anybody's motion, as programs ease or
+      spline over what they miss, and as animators mend by hand: so that is no gap.
     - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
       that stops from one frame to the next.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
@@ -347,7 +350,7 @@ def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
 
 
 def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
-    """Joints that are held with a tremble, or led straight; not what has been found already."""
+    """Joints that are held with a tremble, led straight, or splined; not what has been found already."""
     names, lost = clip.skeleton.names, _found(clip, findings)
     found = []
     for joints, start, stop in held(clip, lost.copy()):
@@ -357,11 +360,13 @@ def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
             some = None if len(joints) == len(names) else tuple(names[joint] for joint in joints)
             found.append(Finding("frozen", some, start, stop, note))
     moving = (np.ptp(clip.rotation, axis=0).max(axis=1) > LIFELESS).sum()
-    for joints, start, stop in even(clip):
-        if not lost[start:stop, list(joints)].any():
-            some = None if 3 * len(joints) > moving else tuple(names[joint] for joint in joints)
-            note = f"turns evenly for {(stop - start) / clip.fps:.2f} s, as if interpolated"
-            found.append(Finding("straight", some, start, stop, note))
+    for kind, turns, led in (("straight", "evenly", even), ("splined", "along a smooth curve", splined)):
+        for joints, start, stop in led(clip):
+            if not lost[start:stop, list(joints)].any():
+                lost[start:stop, list(joints)] = True
+                some = None if 3 * len(joints) > moving else tuple(names[joint] for joint in joints)
+                note = f"turns {turns} for {(stop - start) / clip.fps:.2f} s, as if interpolated"
+                found.append(Finding(kind, some, start, stop, note))
     return found
 
 
