@@ -200,6 +200,19 @@ def test_a_dry_run_writes_nothing(run, take):
     assert planned["would_fill"] == [{"number": 1, "frames": "20:30", "joints": None, "method": "linear"}]
 
 
+def test_a_dry_run_ends_as_the_run_would_and_tells_what_is_left_to_others(run, take):
+    clip = load(take)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[20:40], translation[20:40] = rotation[19], translation[19]
+    translation[100:140] = translation[99]
+    save(clip.with_motion(rotation, translation), take, force=True)
+    planned = run("fill", "take.bvh", "--method", "spline", "--dry-run", "--json")
+    done = run("fill", "take.bvh", "--method", "spline", "--json")
+    assert planned.code == done.code == 4
+    assert planned.json["left"] == done.json["left"]
+    assert "recover" in planned.json["left"]
+
+
 def test_joints_in_a_range_and_in_the_whole_clip(run, take):
     ranged = run(
         "fill",

@@ -197,7 +197,7 @@ def _dry_run(
     clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), parts)
     seen = replace(seen, pins=tuple(pins))
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
-    left = any(job.method is None for job in jobs)
+    code = 4 if request.left or any(job.method is None for job in jobs) else 0
     if as_json:
         planned = [
             {
@@ -209,8 +209,9 @@ def _dry_run(
             for job in jobs
         ]
         files = [str(path) for path in outputs.all]
-        say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files})
-        return 4 if left else 0
+        more = {"left": request.left} if request.left else {}
+        say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files, **more})
+        return code
     say("\n".join(describe(file, clip)))
     if request.said:
         say(request.said)
@@ -235,4 +236,4 @@ def _dry_run(
         outputs.check(file, force, gaps)
     except RequestError as error:
         say(f"That would end with: {error.what}; {error.why}. {error.fix}")
-    return 4 if left else 0
+    return code

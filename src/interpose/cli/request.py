@@ -142,7 +142,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     kinds = [what for what, some in others.items() if some]
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""
     if not gaps:
-        seen = {one.kind for one in found} & {"jump", "repeated", "noisy", "still"}
+        seen = {one.kind for one in found} & {"jump", "repeated", "noisy", "splined", "still"}
         but = left or (f"what is {', '.join(sorted(seen))}: interpose scan {file} says more" if seen else "")
         why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
         raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
@@ -154,6 +154,11 @@ def _scanned(file: Path, clip: Clip) -> Request:
     ]
     lines += [
         f"  {one.start}:{one.stop} {one.kind} is not: see interpose recover" for one in (*stuck, *sides)
+    ]
+    lines += [
+        f"  {one.start}:{one.stop} splined ({names(one.joints)}) is not: name it to fill it anew"
+        for one in found
+        if one.kind == "splined"
     ]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
