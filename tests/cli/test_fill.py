@@ -378,6 +378,22 @@ def test_convert(run, take):
     assert run("convert", "take.bvh", "slow.bvh").code == 2
 
 
+def test_convert_takes_repeated_frames_out_as_scan_advises(run, take):
+    clip = load(take)
+    at = np.arange(len(clip)) // 2 * 2
+    save(clip.with_motion(clip.rotation[at], clip.translation[at]), take, force=True)
+    assert "take.even.bvh --drop-repeated" in run("scan", "take.bvh").out
+    done = run("convert", "take.bvh", "take.even.bvh", "--drop-repeated")
+    assert done.code == 0
+    assert "moves evenly" in done.out
+    even = load(take.with_name("take.even.bvh"))
+    assert len(even) == len(clip)
+    assert np.abs(even.positions()[:-2] - clip.positions()[:-2]).max() < 0.02
+    again = run("convert", "take.even.bvh", "other.bvh", "--drop-repeated")
+    assert again.code == 2
+    assert not take.with_name("other.bvh").exists()
+
+
 def test_convert_to_more_frames_leads_through_the_old_ones_without_corners(run, take):
     assert run("convert", "take.bvh", "fast.bvh", "--fps", "120").code == 0
     old, new = load(take), load(take.with_name("fast.bvh"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -227,3 +229,28 @@ def test_a_grid_stays_one_where_frames_drop_out_everywhere():
     apart = np.diff(time.grid(known[:, None], 4.0))
     assert apart.min() > 2
     assert apart.max() < 6.1
+
+
+@pytest.mark.parametrize(("real", "shown"), [(12, np.floor), (15, np.floor), (24, np.floor), (24, np.round)])
+def test_film_in_video_moves_evenly_once_repeated_frames_are_out(cmu_walk, real, shown):
+    film = time.resample(cmu_walk, real, smooth=True)
+    at = shown(np.arange(len(cmu_walk)) * real / 30 + 1e-9).astype(int)
+    at = at[at < len(film)]
+    video = replace(film, rotation=film.rotation[at], translation=film.translation[at], fps=30.0)
+    even = time.spread(video, np.diff(at, prepend=-1) == 0)
+    assert len(even) == len(video)
+    wanted = time.resample(film, 30.0, smooth=True).positions()
+    off = np.linalg.norm(even.positions()[: len(wanted)] - wanted[: len(even)], axis=-1)
+    assert off[:-3].max() < 1e-3
+
+
+def test_frames_that_were_dropped_come_back_where_they_were(cmu_walk):
+    again = np.random.default_rng(0).random(len(cmu_walk)) < 0.15
+    again[[0, -1]] = False
+    at = np.maximum.accumulate(np.where(again, 0, np.arange(len(cmu_walk))))
+    held = cmu_walk.with_motion(cmu_walk.rotation[at], cmu_walk.translation[at])
+    even = time.spread(held, again)
+    assert np.allclose(even.rotation[~again], cmu_walk.rotation[~again])
+    off = np.linalg.norm(even.positions() - cmu_walk.positions(), axis=-1)
+    assert off.max() < 0.25 * np.linalg.norm(held.positions() - cmu_walk.positions(), axis=-1).max()
+    assert time.spread(cmu_walk, np.zeros(len(cmu_walk), bool)) is cmu_walk

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from interpose.cli.console import names, say
 from interpose.cli.reading import Reading, describe
-from interpose.errors import RequestError
+from interpose.errors import NothingError, RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
@@ -25,6 +25,7 @@ def convert(
     *,
     fps: float | None = None,
     onto: Path | None = None,
+    drop_repeated: bool = False,
     force: bool = False,
     reading: Reading = Reading(),  # noqa: B008
 ) -> None:
@@ -39,6 +40,7 @@ def convert(
       interpose convert take.amc take.bvh --skeleton subject.asf
       interpose convert take.bvh take30.bvh --fps 30
       interpose convert take.bvh mine.bvh --onto rig.bvh
+      interpose convert take.bvh take.even.bvh --drop-repeated
 
     Args:
         file: the clip to read.
@@ -46,11 +48,14 @@ def convert(
         fps: frames a second of what is written.
         onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
             as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
+        drop_repeated: take out whole frames that are the one before, as `interpose scan` finds them, and
+            spread the others over the time: 24 frames a second in a file of 30 move evenly.
         force: replace an existing file.
     """
     from interpose.finish import retarget
     from interpose.formats import save
-    from interpose.geometry.time import resample
+    from interpose.geometry.time import resample, spread
+    from interpose.observation.scan import repeats
     from interpose.observation.timeline import other_rig
 
     clip, rig = reading.load_all([file, onto or file])
@@ -65,16 +70,29 @@ def convert(
             "nobody records or plays that",
             f"Choose up to {FASTEST:g}.",
         )
-    made, kept = clip, ""
+    made, said = clip, ""
+    if drop_repeated:
+        again = repeats(clip)
+        if not again.any():
+            raise NothingError(
+                f"no frames of {file} are repeated",
+                "none, or too few to be more than chance, are the one before",
+                "Leave --drop-repeated out.",
+            )
+        made, said = (
+            spread(clip, again),
+            f"; {again.sum()} were repeated, and what moved in steps moves evenly",
+        )
+    kept = ""
     if onto is not None:
-        made = retarget(clip, rig)
+        made = retarget(made, rig)
         kept = _kept(clip, rig) if other_rig(clip, rig) else ""
     made = replace(resample(made, fps, smooth=True), source=made.source) if fps is not None else made
     notes = save(replace(made, name=output.stem), output, force=force)
     say("\n".join([*describe(file, clip), *(describe(onto, rig) if onto is not None else [])]))
     for note in (*([kept] if kept else []), *notes):
         say(f"note: {note}")
-    say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps")
+    say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps{said}")
 
 
 def _kept(clip: Clip, rig: Clip) -> str:

@@ -80,6 +80,9 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose recover {quote(str(file))} puts limbs back.")
     if any(one.kind == "noisy" for one in found):
         say(f"interpose denoise {quote(str(file))} smooths what trembles.")
+    if any(one.kind == "repeated" for one in found):
+        made = quote(str(file.with_name(f"{file.stem}.even{file.suffix}")))
+        say(f"interpose convert {quote(str(file))} {made} --drop-repeated takes repeated frames out.")
     jumps = [one for one in found if one.kind == "jump"]
     if jumps:
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))

@@ -233,3 +233,34 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     old = nearest[new].astype(int)
     rotation[new], translation[new] = clip.rotation[old], clip.translation[old]
     return replace(clip, rotation=rotation, translation=translation, fps=fps, source=None)
+
+
+def spread(clip: Clip, again: np.ndarray) -> Clip:
+    """The clip without the frames (F,) that are `again` what the one before is; as long as it was.
+
+    Those left are laid evenly over the frames that they had, as of film in video; where they come too
+    irregularly for that, as when a recorder drops frames, each stays where it is. In between the motion is
+    interpolated with continuous velocities.
+    """
+    kept = np.flatnonzero(~again)
+    held = np.flatnonzero(np.diff(kept) > 1) + 1  # those that come later than by one
+    if not len(held):
+        return clip
+    times = np.interp(np.arange(len(clip)), _due(kept, int(held[0]), int(held[-1])), np.arange(len(kept)))
+    rotation = sample_rotations_smooth(clip.rotation[kept], times)
+    return replace(clip, rotation=rotation, translation=sample_smooth(clip.translation[kept], times))
+
+
+def _due(kept: np.ndarray, first: int, last: int) -> np.ndarray:
+    """When samples were due that are seen at frames `kept` (n,), of which some up to `first` and from `last`
+    on may lie as close as frames do, and those in between do not."""
+    line = kept[first] + (np.arange(len(kept)) - first) * (kept[last] - kept[first]) / max(last - first, 1)
+    late = kept - line
+    # Of samples that come at an even pace none is seen later than others by a whole frame.
+    if np.ptp(late[first : last + 1]) >= 1.0:
+        return kept.astype(float)
+    start = 0 if np.ptp(late[: last + 1]) < 1.0 else first
+    stop = len(kept) if np.ptp(late[start:]) < 1.0 else last + 1
+    if stop - start == len(kept):
+        line = line + late[0]  # the first frame stays the first
+    return np.concatenate([kept[:start], line[start:stop], kept[stop:]])

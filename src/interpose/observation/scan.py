@@ -177,6 +177,18 @@ def stuck(clip: Clip) -> list[Finding]:
     return [one for one in found if one.kind == "frozen position"] + _held_place(clip, found)
 
 
+def repeats(clip: Clip) -> np.ndarray:
+    """(F,) booleans: the frames that "repeated" of `scan` counts, which are the one before."""
+    again = np.zeros(len(clip), bool)
+    if len(clip) > 2:
+        turned, moved = _steps(clip, Observation.full(clip))
+        odd = {one.start for one in _strays(clip, turned)}
+        first, last = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
+        for start, stop in _holds(turned[first : last - 1], moved[first : last - 1], clip.fps):
+            again[first + start + 1 : first + stop + 1] = True
+    return again
+
+
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
     """The gaps to fill. A frozen position is none: a gap cannot be in the root's position alone. Nor are
     values that drop out: `recover` finds both by itself."""
@@ -419,21 +431,26 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
 
 def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> list[Finding]:
     """Frames that are the one before though the body moves: one finding; steps as in `_frozen`."""
-    with np.errstate(invalid="ignore"):
-        same = np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
-    for longest, often in ((REPEATS, OFTEN), (round(HOLDS * fps), MOSTLY)):
-        brief = [
-            run for run in runs(same) if run[1] - run[0] <= longest and run[0] > 0 and run[1] < len(same)
-        ]
-        again = sum(stop - start for start, stop in brief)
-        if len(brief) >= MANY and again >= often * (brief[-1][1] - brief[0][0]):
-            break
-    else:
+    brief = _holds(turned, moved, fps)
+    if not brief:
         return []
-    start, stop = brief[0][0], brief[-1][1]
+    again, start, stop = sum(stop - start for start, stop in brief), brief[0][0], brief[-1][1]
     real = fps * (1 - again / (stop - start))
     note = f"{again} frames are the one before: {real:.0f} frames a second, in a file of {fps:.4g}"
     return [Finding("repeated", None, first + start + 1, first + stop + 1, note)]
+
+
+def _holds(turned: np.ndarray, moved: np.ndarray, fps: float) -> list[tuple[int, int]]:
+    """Runs of steps in which nothing moves, again and again; none where that is the exception."""
+    with np.errstate(invalid="ignore"):
+        same = np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
+    for longest, often in ((REPEATS, OFTEN), (round(HOLDS * fps), MOSTLY)):
+        brief = [run for run in runs(same) if run[1] - run[0] <= longest]
+        inside = [run for run in brief if run[0] > 0 and run[1] < len(same)]
+        again = sum(stop - start for start, stop in inside)
+        if len(inside) >= MANY and again >= often * (inside[-1][1] - inside[0][0]):
+            return brief
+    return []
 
 
 def _noisy(clip: Clip, known: Observation) -> list[Finding]:
