@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import subprocess
 import sys
@@ -59,6 +60,15 @@ def test_every_verb_explains_itself(run, verb):
     assert done.code == 0
     assert f"Usage: interpose {verb}" in done.out
     assert len(done.out.splitlines()) > 6
+
+
+@pytest.mark.parametrize("verb", ["fill", "convert", "scan", "stitch"])
+def test_help_flows_to_the_width_of_the_terminal(run, verb):
+    """No line of a paragraph is shorter than it must be, and none is too long."""
+    lines = [line.rstrip() for line in run(verb, "--help").out.splitlines()]
+    assert max(map(len, lines)) <= 80
+    prose = [one if one[:1].isalpha() and not one.endswith(":") else "" for one in lines]
+    assert all(len(a) + 1 + len(b.split()[0]) > 80 for a, b in itertools.pairwise(prose) if a and b)
 
 
 def test_the_help_of_fill_shows_how(run):

@@ -19,11 +19,13 @@ from cyclopts import (
 
 from interpose.cli import VERBS
 from interpose.cli.console import screen
+from interpose.cli.helping import Flowing
 from interpose.errors import RequestError
 
 app = App(
     name="interpose",
     help_format="plaintext",
+    help_formatter=Flowing(),
     version_flags=(),
     default_parameter=Parameter(negative=(), show_default=False),
     suppress_keyboard_interrupt=False,

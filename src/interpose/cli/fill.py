@@ -62,7 +62,7 @@ def fill(
       interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
         --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
       interpose fill take.bvh --layer --from wave.bvh --at 130
-        --joints RightArm,RightHand   (another clip's arm over the motion that is there)
+        --joints RightArm,RightHand   (that arm over the motion that is there)
 
     Ends with 0 when all is filled, 4 when a gap stays open, or when hips or limbs are
     left to `interpose recover`, 2 or 3 when nothing was done.
