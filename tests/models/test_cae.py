@@ -17,7 +17,7 @@ from interpose.models.keys import neighbours  # noqa: E402
 from interpose.models.vanilla import Vanilla  # noqa: E402
 from interpose.skeletons import JOINTS, SIDES  # noqa: E402
 from interpose.training.deconvolution import quicken  # noqa: E402
-from interpose.training.export import export_onnx  # noqa: E402
+from interpose.training.graphs import export_cae_onnx  # noqa: E402
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +178,7 @@ def graph(model, tmp_path_factory):  # type: ignore[no-untyped-def]
     """The exported graph, and the same network with its weights rounded to the 16 bits of the file."""
     pytest.importorskip("onnxscript")
     path = tmp_path_factory.mktemp("onnx") / "cae.onnx"
-    export_onnx(model, path)
+    export_cae_onnx(model, path)
     for parameter in model.parameters():
         if parameter.numel() >= 1024:
             parameter.data = parameter.data.half().float()

@@ -18,7 +18,7 @@ from interpose.models.cmib import Cmib, CmibConfig, between_keys, restore_bones 
 from interpose.skeletons import PARENTS, find_humanoid  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cmib import CmibSettings, Losses, draw_keys, train_cmib  # noqa: E402
-from interpose.training.export import export_cmib_onnx  # noqa: E402
+from interpose.training.graphs import export_cmib_onnx  # noqa: E402
 from interpose.training.loop import restore  # noqa: E402
 from interpose.training.poses import Batch, Poses, labels_of, new_path, random_path  # noqa: E402
 

@@ -31,7 +31,7 @@ from interpose.models.base import (  # noqa: E402
 from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
-from interpose.training import export  # noqa: E402
+from interpose.training import graphs  # noqa: E402
 from interpose.training.base import (  # noqa: E402
     JUDGED,
     STANDS,
@@ -289,11 +289,11 @@ def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
     A graph whose weights take several files reads them, instead of holding them once more.
     """
     one, said, sizes = copy.deepcopy(model).float(), [], []
-    for size, files in ((export.SHARD, 1), (20_000, 3)):
+    for size, files in ((graphs.SHARD, 1), (20_000, 3)):
         path = tmp_path / str(files) / "small.onnx"
         path.parent.mkdir()
-        monkeypatch.setattr(export, "SHARD", size)
-        export.export_base_onnx(one, path)
+        monkeypatch.setattr(graphs, "SHARD", size)
+        graphs.export_base_onnx(one, path)
         shards = shard_paths(path)
         assert len(shards) == files
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
@@ -334,7 +334,7 @@ def test_it_completes_clips(trained, cmu_walk, monkeypatch):
 def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_path):
     """Also where the two disagree; what is known of half a pose stays exactly."""
     path = tmp_path / "small.onnx"
-    export.export_base_onnx(copy.deepcopy(model).float(), path)
+    graphs.export_base_onnx(copy.deepcopy(model).float(), path)
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
     known = known == 1
     known[12:20, 5:9] = True
