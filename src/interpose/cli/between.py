@@ -33,7 +33,7 @@ def between(
     player: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Generate the motion between key poses; the keys themselves come back unchanged.
 

@@ -35,7 +35,7 @@ def compare(
     seed: int | None = None,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Fill gaps by several methods, and play the results over each other or side by side.
 

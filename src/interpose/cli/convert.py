@@ -27,7 +27,7 @@ def convert(
     onto: Path | None = None,
     drop_repeated: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> None:
     """Write a clip in another format, at another frame rate, or on another skeleton.
 

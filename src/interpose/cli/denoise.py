@@ -32,7 +32,7 @@ def denoise(
     dry_run: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Smooth a noisy clip, and fill joints that snap to their rest pose or spike for some frames.
 

@@ -44,7 +44,7 @@ def fill(
     dry_run: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Fill gaps in a clip; what is not missing comes back unchanged.
 

@@ -35,7 +35,7 @@ def forecast(
     player: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Go on with a clip: frames are added after its last one.
 

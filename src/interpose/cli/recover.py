@@ -34,7 +34,7 @@ def recover(
     dry_run: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 

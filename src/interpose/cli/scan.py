@@ -18,7 +18,7 @@ SHOWN = 10  # dropouts, of many
 
 
 @each
-def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:  # noqa: B008
+def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:
     """Find what looks missing or wrong: frozen runs, stray rest poses, joints that drop out, swapped limbs.
 
     Also limbs that are held with a tremble, joints that another program led straight or

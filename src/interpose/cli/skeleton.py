@@ -31,7 +31,7 @@ def skeleton(
     at: str | None = None,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Print the tree of joints: which of the 22 that networks know each one is, and what just follows.
 

@@ -60,7 +60,7 @@ def stitch(
     player: bool = False,
     json: bool = False,
     force: bool = False,
-    reading: Reading = Reading(),  # noqa: B008
+    reading: Reading = Reading(),
 ) -> int:
     """Lay clips one after another, and generate what leads from each to the next.
 
