@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import interpose
+from interpose.finish import Provenance
+from interpose.geometry import rotations
 
 SOURCE = Path(interpose.__file__).parents[1]
 
@@ -133,3 +136,85 @@ def test_gaps_that_are_none_say_how_to_write_one(cmu_walk, gap):
     with pytest.raises(interpose.RequestError, match="cannot read the gap") as failed:
         interpose.fill(cmu_walk, gap)
     assert len(str(failed.value)) < 300
+
+
+def test_numbers_of_any_kind_say_frames(cmu_walk):
+    whole = interpose.fill(cmu_walk, (60, 80), method="spline").clip.rotation
+    for gap in (np.array([60, 80]), (np.int64(60), np.int64(80)), (60.0, 80.0), "2s:80", "60:80"):
+        assert np.array_equal(interpose.fill(cmu_walk, gap, method="spline").clip.rotation, whole)
+    assert interpose.between(cmu_walk, [0.0, np.int64(20)], method="spline").report.gaps[0].stop == 20
+    stitched = interpose.stitch([cmu_walk, cmu_walk], np.int64(10), method="spline")
+    assert len(stitched.clip) == 2 * len(cmu_walk) + 10
+    assert interpose.stitch(cmu_walk, 10, loop=True, method="spline").report.gaps
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda clip: interpose.between(clip, [0, 30.5]),
+        lambda clip: interpose.between(clip, "0,30"),
+        lambda clip: interpose.between(clip, [0, np.nan]),
+        lambda clip: interpose.stitch([clip, clip], 10.5),
+        lambda clip: interpose.stitch([clip, clip], None),
+        lambda clip: interpose.fill(clip, (60, 80), path={70.5: (0, 1)}),
+        lambda clip: interpose.fill(clip, (60, 80), path={70: (0, 1, 2)}),
+        lambda clip: interpose.fill(clip, (60, 80), path={70: (np.nan, 0)}),
+        lambda clip: interpose.fill(clip, (60, 80), path={70: "here"}),
+        lambda clip: interpose.fill(clip, (60, 80, [])),
+        lambda clip: interpose.recover(clip, []),
+        lambda clip: interpose.recover(clip, "LeftArm", (10, 20, ["RightArm"])),
+        lambda clip: interpose.scan(clip, interpose.Observation.full(clip).slice(0, 50)),
+        lambda clip: interpose.Gap(10.5, 20),
+        lambda clip: interpose.save(interpose.fill(clip, (60, 80), method="spline"), "x.bvh"),
+        lambda clip: interpose.Clip(clip.skeleton, None, clip.translation, 30.0),
+        lambda clip: replace(clip, translated=(99,)),
+        lambda clip: replace(clip.skeleton, rest_rotation=np.zeros((5, 4))),
+        lambda clip: replace(clip.skeleton, rest_scale=np.ones(5)),
+        lambda clip: replace(clip.skeleton, rest_scale=-np.ones(len(clip.skeleton))),
+        lambda clip: interpose.Observation.from_nan(clip.skeleton, clip.rotation, clip.translation[:5], 30.0),
+        lambda clip: interpose.Observation.from_nan(
+            clip.skeleton, clip.rotation, clip.translation, 30.0, (77,)
+        ),
+        lambda clip: interpose.fill(clip, (60, 80), pins=interpose.Pin("LeftHand", [70])),
+    ],
+)
+def test_what_makes_no_sense_is_refused_in_three_lines(cmu_walk, ask):
+    with pytest.raises(interpose.RequestError) as error:
+        ask(cmu_walk)
+    assert len(str(error.value).splitlines()) == 3
+
+
+def test_what_was_left_open_is_not_called_observed(cmu_walk):
+    done = interpose.fill(cmu_walk, [(20, 30), (50, 90)], max_gap=20, method="spline")
+    assert (done.provenance[50:90] == Provenance.OPEN).all()
+    assert not (done.provenance[:50] == Provenance.OPEN).any()
+
+
+def test_joints_of_a_part_that_are_misspelt_are_named(cmu_walk):
+    with pytest.raises(interpose.RequestError, match="unknown joint: LefArm"):
+        interpose.fill(cmu_walk, (60, 80), parts=interpose.Part(cmu_walk, 0, 5, 65, "LefArm"))
+
+
+def test_centimetres_for_metres_are_asked_about(cmu_walk):
+    skeleton = replace(cmu_walk.skeleton, rest_translation=100 * cmu_walk.skeleton.rest_translation)
+    huge = replace(cmu_walk, skeleton=skeleton, translation=100 * cmu_walk.translation, source=None)
+    assert any("is the unit right?" in note for note in interpose.fill(huge, (60, 80)).report.gaps[0].notes)
+
+
+def test_a_clip_of_one_joint_is_completed():
+    rng = np.random.default_rng(0)
+    turns = rotations.exp(0.05 * rng.standard_normal((60, 1, 3)).cumsum(axis=0))
+    clip = interpose.Clip(
+        interpose.Skeleton(("one",), (-1,), np.zeros((1, 3))), turns, np.zeros((60, 1, 3)), 30.0
+    )
+    for method in ("zero-velocity", "kalman", "spline"):
+        assert len(interpose.fill(clip, (20, 40), method=method).clip) == 60
+    assert len(interpose.denoise(clip).clip) == 60
+
+
+def test_names_that_bvh_cannot_hold_are_refused(cmu_walk, tmp_path):
+    names = ("a{", *cmu_walk.skeleton.names[1:])
+    odd = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, names=names), source=None)
+    with pytest.raises(interpose.RequestError, match="as BVH"):
+        interpose.save(odd, tmp_path / "odd.bvh")
+    assert not list(tmp_path.iterdir())

@@ -73,6 +73,18 @@ def test_nothing_leaks(cmu_walk, method):
     assert one.translation.tobytes() == other.translation.tobytes()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_nothing_leaks_where_values_are_lost_here_and_there(cmu_walk, seed):
+    rng, clip = np.random.default_rng(seed), cmu_walk.slice(20, 80)
+    known = rng.random(clip.rotation.shape[:2]) > 0.3
+    seen = Observation(known, np.ones_like(known))
+    rotation = clip.rotation.copy()
+    rotation[~known] = rotations.normalize(rng.standard_normal((int((~known).sum()), 4)))
+    poisoned = clip.with_motion(rotation, clip.translation)
+    one, other = (tasks.fill(given, seen).clip for given in (clip, poisoned))
+    assert one.rotation.tobytes() == other.rotation.tobytes()
+
+
 def test_a_gap_of_a_long_clip_is_the_gap_of_its_window(long_walk):
     """The window holds all that counts, but for the clip's own acceleration, which limits the seams."""
     gap = Gap(600, 630)

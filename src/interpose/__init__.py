@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, SupportsInt, TypeAlias
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -124,9 +124,9 @@ def fill(
 
     Args:
         clip: a clip, or the path of one. Its values inside the gaps have no influence.
-        gaps: one or several, each a Gap, "120:160" for frames 120 to 159, (120, 160) or
-            (120, 160, ["LeftArm"]). An Observation says for every value whether it is known. None: what a
-            scan of the clip finds.
+        gaps: one or several, each a Gap, "120:160" for frames 120 to 159, "4s:5.3s", "120:" to the end,
+            (120, 160) or (120, 160, ["LeftArm"]). An Observation says for every value whether it is known.
+            None: what a scan of the clip finds.
         method: one of `method_names()`, or "auto" for what measured best at each gap's length.
         max_gap: frames; longer gaps stay open.
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
@@ -163,7 +163,7 @@ def fill(
                 'Give gaps="120:160".',
             )
     else:
-        wanted = gaps if isinstance(gaps, Observation) else [_gap(gap) for gap in _several(gaps)]
+        wanted = gaps if isinstance(gaps, Observation) else [_gap(gap, clip) for gap in _several(gaps)]
     given = [parts] if isinstance(parts, Part) else list(parts)
     return tasks.fill(
         clip,
@@ -204,11 +204,11 @@ def recover(
     """
     from interpose import tasks
 
-    chosen = _gap(frames) if frames is not None else None
+    clip = _clip(clip)
     return tasks.recover(
-        _clip(clip),
+        clip,
         [joints] if isinstance(joints, str) else joints if joints is None else list(joints),
-        (chosen.start, chosen.stop) if chosen else None,
+        _range(frames, clip),
         method=method,
         seed=seed,
         progress=progress,
@@ -248,12 +248,12 @@ def denoise(
     """
     from interpose import tasks
 
-    chosen = _gap(frames) if frames is not None else None
+    clip = _clip(clip)
     return tasks.denoise(
-        _clip(clip),
+        clip,
         strength,
         [joints] if isinstance(joints, str) else joints,
-        (chosen.start, chosen.stop) if chosen else None,
+        _range(frames, clip),
         method,
         seed,
     )
@@ -321,7 +321,7 @@ def forecast(
 
 
 def stitch(
-    clips: Sequence[Clip | str | Path],
+    clips: Clip | str | Path | Sequence[Clip | str | Path],
     frames: str | int | Sequence[int] = "auto",
     action: str = "",
     *,
@@ -356,9 +356,15 @@ def stitch(
             not fit, and what `fill` refuses.
         FileError: a file cannot be read.
     """
-    from interpose import tasks
+    from pathlib import Path
 
-    return tasks.stitch([_clip(clip) for clip in clips], frames, align, loop, action, method, seed, progress)
+    from interpose import tasks
+    from interpose.clip import Clip
+
+    several = [clips] if isinstance(clips, Clip | str | Path) else clips
+    return tasks.stitch(
+        [_clip(clip) for clip in several], frames, align, loop, action, method, seed, progress
+    )
 
 
 def retarget(clip: Clip | str | Path, like: Clip | str | Path) -> Clip:
@@ -397,21 +403,37 @@ def _several(gaps: Any) -> list[Any]:
     if isinstance(gaps, Gap | str) or not isinstance(gaps, Iterable):
         return [gaps]
     gaps = list(gaps)
-    return [tuple(gaps)] if gaps and isinstance(gaps[0], int) else gaps
+    return [tuple(gaps)] if gaps and isinstance(gaps[0], SupportsInt) else gaps
 
 
-def _gap(gap: Any) -> Gap:
+def _range(frames: Any, clip: Clip) -> tuple[int, int] | None:
+    """A range of frames, or None for all of them."""
+    from interpose.errors import RequestError
+
+    if frames is None:
+        return None
+    chosen = _gap(frames, clip)
+    if chosen.joints is not None:
+        raise RequestError(
+            "a range of frames has no joints", "they are an argument of their own", "Write joints=."
+        )
+    return chosen.start, chosen.stop
+
+
+def _gap(gap: Any, clip: Clip) -> Gap:
     from interpose.errors import RequestError
     from interpose.observation import Gap
 
     if isinstance(gap, Gap):
         return gap
     if isinstance(gap, str):
-        return Gap.parse(gap)
+        return Gap.parse(gap, clip=clip)
     try:
         start, stop, *joints = gap
         names = [joints[0]] if joints and isinstance(joints[0], str) else joints[0] if joints else None
-        return Gap(int(start), int(stop), tuple(names) if names is not None else None)
+        if names is None or len(names):
+            return Gap(start, stop, tuple(names) if names is not None else None)
+        raise ValueError
     except (TypeError, ValueError):
         raise RequestError(
             f"cannot read the gap {str(gap)[:60]}",

@@ -45,17 +45,42 @@ class Skeleton:
         fill(self, "rest_translation", np.asarray(self.rest_translation, float))
         if self.rest_translation.shape != (count, 3) or not np.isfinite(self.rest_translation).all():
             raise RequestError(
-                "bones do not fit", f"expected ({count}, 3) numbers, got {self.rest_translation.shape}"
+                "bones do not fit",
+                f"expected ({count}, 3) numbers, got {self.rest_translation.shape}",
+                "rest_translation has a row in metres for each joint.",
             )
         if self.rest_rotation is None:
             fill(self, "rest_rotation", np.tile([1.0, 0, 0, 0], (count, 1)))
         if self.rest_scale is None:
             fill(self, "rest_scale", np.ones(count))
+        for name, shape in (("rest_rotation", (count, 4)), ("rest_scale", (count,))):
+            fill(self, name, value := np.asarray(getattr(self, name), float))
+            if value.shape != shape or not np.isfinite(value).all():
+                raise RequestError(
+                    f"{name} does not fit",
+                    f"expected {shape} numbers, got {value.shape}",
+                    "It has a row for each joint; leave it out where there is none.",
+                )
+        if not (self.rest_scale > 0).all():
+            name = self.names[int(self.rest_scale.argmin())]
+            raise RequestError(
+                f"the scale of {name} is {self.rest_scale.min():g}",
+                "a joint can be larger or smaller, and not inside out",
+                "Use scales above 0.",
+            )
         if len(set(self.names)) != count:
             twice = sorted({name for name in self.names if self.names.count(name) > 1})
-            raise RequestError("the skeleton is ambiguous", f"joint names occur twice: {', '.join(twice)}")
+            raise RequestError(
+                "the skeleton is ambiguous",
+                f"joint names occur twice: {', '.join(twice)}",
+                "Give each joint a name of its own.",
+            )
         if len(self.parents) != count or any(not -1 <= p < j for j, p in enumerate(self.parents)):
-            raise RequestError("the skeleton is no tree", "every parent must come before its children")
+            raise RequestError(
+                "the skeleton is no tree",
+                "every parent must come before its children",
+                "Sort the joints so; parents are indices, and -1 of a root.",
+            )
 
     def __len__(self) -> int:
         return len(self.names)
@@ -131,15 +156,25 @@ class Clip:
             fill(self, "translated", self.skeleton.roots)
         fill(self, "rotation", np.asarray(self.rotation, float))
         fill(self, "translation", np.asarray(self.translation, float))
-        frames, joints = self.rotation.shape[0], len(self.skeleton)
-        if self.rotation.shape != (frames, joints, 4):
+        joints = len(self.skeleton)
+        if self.rotation.ndim != 3 or self.rotation.shape[1:] != (joints, 4):
             raise RequestError(
-                "rotations do not fit", f"expected (F, {joints}, 4), got {self.rotation.shape}"
+                "rotations do not fit",
+                f"expected (F, {joints}, 4), got {self.rotation.shape}",
+                "They are quaternions w, x, y, z of every joint in every frame.",
+            )
+        frames = len(self.rotation)
+        if not all(0 <= joint < joints for joint in self.translated):
+            raise RequestError(
+                f"there is no joint {max(self.translated, key=abs)} to be translated",
+                f"the skeleton has {joints} joints, counted from 0",
+                "translated lists the joints whose translation is animated, by index.",
             )
         if self.translation.shape != (frames, len(self.translated), 3):
             raise RequestError(
                 "translations do not fit",
                 f"expected ({frames}, {len(self.translated)}, 3), got {self.translation.shape}",
+                "There is one, in metres, for each joint in translated: the roots, if that is left out.",
             )
         if not isinstance(self.fps, int | float | np.number) or not SLOWEST <= self.fps <= FASTEST:
             raise RequestError(

@@ -289,15 +289,6 @@ def test_nothing_missing_is_no_work(walk, make):
     assert str(done.report) == "nothing is missing"
 
 
-def test_values_with_little_trust_may_change(walk, speaking):
-    known = Observation.full(walk)
-    known.trust[40:60] = 0.5
-    done = complete(walk, known, speaking(walk))
-    assert (done.provenance[40:60] == Provenance.OBSERVED).sum() == 0
-    assert done.clip.rotation[:40].tobytes() == walk.rotation[:40].tobytes()
-    assert not np.array_equal(done.clip.rotation[40:60], walk.rotation[40:60])
-
-
 def test_motion_that_is_observed_is_no_seam(walk):
     """A missing wrist while the observed legs step hard must not be blamed for their jump."""
     feet = [walk.skeleton.index(n) for n in ("LeftUpLeg", "RightUpLeg")]

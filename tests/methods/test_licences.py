@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -46,6 +47,19 @@ def test_only_open_weights_where_that_is_asked_for(walk):
         with pytest.raises(RequestError, match="cae are not open"):
             interpose.fill(walk, gap, method=str(ROOT / "weights" / "cae"))
     assert auto.choose(walk, gap)[0].name == "small"
+
+
+def test_the_licence_holds_in_all_threads_and_ends_with_whoever_asked(walk):
+    gap = second(walk)
+
+    def chosen() -> str:
+        return auto.choose(walk, gap, lone=2)[0].name
+
+    with interpose.license("open"), ThreadPoolExecutor(1) as others:
+        assert others.submit(chosen).result() == "small-open"
+        with interpose.license("any"):
+            assert chosen() == "small-open", "who asks for less does not get more"
+    assert chosen() == "small"
 
 
 def test_unknown_licences_list_the_known_ones():

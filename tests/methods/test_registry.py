@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 import subprocess
 import sys
 from importlib.metadata import EntryPoint
+from pathlib import Path
 
+import numpy as np
 import pytest
 
-from interpose.errors import RequestError
+import interpose
+from interpose.errors import FileError, RequestError
 from interpose.methods import classical, registry, weights
 
 
@@ -19,10 +24,10 @@ def offer(monkeypatch: pytest.MonkeyPatch):
     def pretend(**methods: str) -> None:
         found = [EntryPoint(name, value, registry.GROUP) for name, value in methods.items()]
         monkeypatch.setattr(registry, "entry_points", lambda group: found)
-        registry.get.cache_clear()
+        registry._named.cache_clear()
 
     yield pretend
-    registry.get.cache_clear()
+    registry._named.cache_clear()
 
 
 def test_every_name_gives_a_method_of_that_name():
@@ -61,5 +66,45 @@ def test_weights_by_name_or_by_folder(tmp_path):
     card = weights.card("cae")
     assert card.name == "cae"
     assert weights.card(str(card.path.parent)) == card
-    with pytest.raises(RequestError, match="unknown model"):
+    with pytest.raises(RequestError, match="is no model") as error:
         weights.card(str(tmp_path))
+    assert "has none" in error.value.why
+    with pytest.raises(RequestError, match="unknown model"):
+        weights.card("nowhere")
+
+
+def copied(name: str, folder: Path) -> Path:
+    """Installed weights in a folder of somebody's own."""
+    card = weights.card(name)
+    folder.mkdir(exist_ok=True)
+    for path in (card.path, card.onnx):
+        shutil.copy(path, folder / f"mine{path.suffix}")
+    return folder
+
+
+def test_weights_that_were_written_anew_are_read_anew(tmp_path, cmu_walk):
+    said = []
+    for name in ("small", "small-open"):
+        folder = copied(name, tmp_path / "mine")
+        os.utime(folder / "mine.onnx", ns=(len(said), len(said)))
+        said.append(interpose.fill(cmu_walk, (80, 110), method=str(folder)).clip)
+    assert not np.array_equal(said[0].rotation, said[1].rotation)
+
+
+def test_damaged_weights_are_the_fault_of_the_file(tmp_path, cmu_walk):
+    folder = copied("small-open", tmp_path / "mine")
+    (folder / "mine.onnx").write_bytes(b"no graph")
+    with pytest.raises(FileError, match="cannot read the network"):
+        interpose.fill(cmu_walk, (80, 110), method=str(folder))
+    card = folder / "mine.json"
+    card.write_text(card.read_text().replace('"method": "small-open"', '"method": "linear"'))
+    with pytest.raises(RequestError, match="is no model"):
+        registry.get(str(folder))
+
+
+def test_a_method_that_cannot_be_loaded_is_no_reason_for_others_to_fail(offer):
+    offer(broken="nowhere:Bad", auto="interpose.methods.classical:Linear")
+    assert "auto" not in registry.names()
+    with pytest.raises(RequestError, match="has no temperature") as error:
+        registry.told("small", temperature=2.0)
+    assert "stmi-gan" in error.value.fix

@@ -94,7 +94,7 @@ def test_shapes_must_agree():
     with pytest.raises(RequestError, match="does not fit"):
         Observation(np.ones((3, 4)), np.ones((3, 5)))
     with pytest.raises(RequestError, match="does not fit"):
-        Observation(np.ones((3, 4)), np.ones((3, 4)), trust=np.ones(3))
+        Observation(np.ones(3), np.ones(3))
 
 
 def test_slices():

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-from contextvars import copy_context
 
 from cyclopts import (
     App,
@@ -21,6 +20,7 @@ from interpose.cli import VERBS
 from interpose.cli.console import screen
 from interpose.cli.helping import Flowing
 from interpose.errors import RequestError
+from interpose.methods.weights import asked_anew
 
 app = App(
     name="interpose",
@@ -37,18 +37,16 @@ for verbs in VERBS.values():
 
 def run(tokens: list[str]) -> int:
     """Parse and call; returns the exit code. Raises RequestError when the tokens make no sense."""
-    # In a context of its own, so that what a command line says of licences holds for it alone.
-    here = copy_context()
     try:
-        code = here.run(
-            app,
-            tokens,
-            console=screen(),
-            exit_on_error=False,
-            print_error=False,
-            help_on_error=False,
-            result_action="return_value",
-        )
+        with asked_anew():  # what a command line says of licences holds for it alone
+            code = app(
+                tokens,
+                console=screen(),
+                exit_on_error=False,
+                print_error=False,
+                help_on_error=False,
+                result_action="return_value",
+            )
     except CycloptsError as error:
         raise translate(error) from None
     return code if isinstance(code, int) else 0

@@ -61,6 +61,8 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
         rows.append([name, str(one["clips"]), f"{one['hours']:.2f}", str(len(one["performers"])), *parts])
     say_table(("data set", *columns), rows, right=columns)
     for name, one in found.items():
+        if not one["clips"]:
+            continue
         say()
         for split in ("validation", "test"):
             if one[split]["performers"]:

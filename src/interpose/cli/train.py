@@ -178,7 +178,7 @@ def own(
     run.mkdir(parents=True, exist_ok=True)
     (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
-    export_base(run, [pack], out, ["train"], allowed)
+    export_base(run, [pack], out, ["train"], allowed, before=begin)
     before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))
     say()
     rows = [

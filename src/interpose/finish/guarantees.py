@@ -67,7 +67,7 @@ def complete(
 
     Args:
         clip: F frames; its unobserved values may be anything.
-        observation: what is known, (F, J). Values with less than full trust may be changed.
+        observation: what is known, (F, J).
         method: what completes it.
         seed: for methods that sample.
         fallback: the simpler method.
@@ -85,7 +85,7 @@ def complete(
     if observation.pins:
         return _pinned(clip, observation, method, seed, fallback, limit, path, first)
     hidden = wipe(clip, observation)
-    known = _trusted(hidden, observation)
+    known = _certain(hidden, observation)
     if path:
         return _along(path, clip, observation, known, method, seed, fallback, limit, first)
     hanging = loose(hidden, known)
@@ -110,8 +110,7 @@ def complete(
     if all(span.problem for span in spans):
         raw = _second(fallback, hidden, observation, gaps, seed)
     else:
-        raw = method.complete(hidden, observation, seed)
-        _sound(raw, hidden, method.name)
+        raw = _said(method, hidden, observation, seed)
 
     opinion, error = _opinion(raw, known, spans)
     if not isinstance(method, Layer):
@@ -290,7 +289,7 @@ def _pinned(
     """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
     pins.check(clip, observation)
     asked, free = pins.merged(observation.pins), replace(observation, pins=())
-    known = _trusted(clip, free)
+    known = _certain(clip, free)
     unled = complete(clip, free, method, seed, fallback, limit, path, first)
     # A network that is told of one frame changes that frame: it is told the whole way there and back.
     ways = pins.ways(unled.clip, known, asked)
@@ -367,13 +366,22 @@ def wipe(clip: Clip, observation: Observation) -> Clip:
     return Linear().complete(bare, observation).clip
 
 
-def _trusted(clip: Clip, observation: Observation) -> Observation:
-    """What must come back unchanged: observed with full trust, and translations that are not animated."""
-    trusted = observation.trust >= 1
-    translation = observation.translation & trusted
-    still = [j for j in range(len(clip.skeleton)) if j not in clip.translated]
-    translation[:, still] = True
-    return Observation(observation.rotation & trusted, translation)
+def _certain(clip: Clip, observation: Observation) -> Observation:
+    """What must come back unchanged: what is observed, and translations that are not animated."""
+    translation = observation.translation.copy()
+    translation[:, [j for j in range(len(clip.skeleton)) if j not in clip.translated]] = True
+    return Observation(observation.rotation, translation)
+
+
+def _said(method: Method, clip: Clip, observation: Observation, seed: int | None) -> Raw:
+    """What a method says. It gets arrays of its own, whatever it does to them."""
+    own = clip.with_motion(clip.rotation.copy(), clip.translation.copy())
+    seen = replace(
+        observation, rotation=observation.rotation.copy(), translation=observation.translation.copy()
+    )
+    raw = method.complete(own, seen, seed)
+    _sound(raw, clip, method.name)
+    return raw
 
 
 def _of(spans: list[Span], gap: Gap) -> Span:
@@ -392,7 +400,7 @@ def _second(
 
 def _sound(raw: Any, clip: Clip, name: str) -> None:
     """RequestError naming a method that gives something else than a completion of the clip."""
-    if not isinstance(raw, Raw):
+    if not isinstance(raw, Raw) or not isinstance(raw.clip, Clip):
         problem = f"it gave a {type(raw).__name__}, no interpose.methods.protocol.Raw"
     elif raw.clip.rotation.shape != clip.rotation.shape:
         problem = f"it gave {raw.clip.rotation.shape[:2]} frames and joints of {clip.rotation.shape[:2]}"
@@ -413,7 +421,9 @@ def _opinion(raw: Raw, known: Observation, spans: list[Span]) -> tuple[Clip, np.
     lost = ~(np.abs(positions) < NOWHERE).all(axis=(1, 2))
     for span in spans:
         if lost[max(span.start - beside, 0) : span.stop + beside].any():
-            span.problem = span.problem or "it gave positions that are no numbers"
+            span.problem = (
+                span.problem or f"it gave positions that are no numbers, or {NOWHERE / 1e3:g} km away"
+            )
     free = Observation(~grow(~known.rotation, beside), ~grow(~known.translation, beside))
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     error = np.full(len(clip), np.nan)
@@ -579,6 +589,7 @@ def _report(
         notes=(
             *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),
+            *notes.sized(skeleton),
             *notes.sunk(finished, known, gap, first),
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),

@@ -84,7 +84,7 @@ def liveliness(positions: np.ndarray, start: int, stop: int, fps: float) -> floa
     if around * fps < STIRS:
         return None
     middle = positions[start + quarter * (start > 0) : stop - quarter * (stop < len(positions))]
-    return float(_stir(middle) / around)
+    return float(_stir(middle) / around) if len(middle) > 1 else None
 
 
 def _stir(positions: np.ndarray) -> float:

@@ -7,12 +7,12 @@ import math
 import numpy as np
 from scipy import ndimage
 
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.finish import feet, floor, measures
 from interpose.finish.windows import grow
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
-from interpose.skeletons import find_humanoid
+from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
 
@@ -38,6 +38,7 @@ BESIDE = 0.1
 BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 0.7, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
+LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
 
 
 def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
@@ -62,6 +63,14 @@ def _deepest(part: Clip, seen: Observation, start: int, gap: Gap) -> tuple[float
         return None
     frame, joint = np.unravel_index(int(free.argmax()), free.shape)
     return float(free[frame, joint]), joints[joint], start + int(frame)
+
+
+def sized(skeleton: Skeleton) -> list[str]:
+    """A note where a body is so large, or so small, that its unit is none of metres."""
+    leg = find_mapping(skeleton).leg_length
+    if not np.isfinite(leg) or LEGS[0] <= leg <= LEGS[1]:
+        return []
+    return [f"flagged: its legs are {leg:.3g} m long: is the unit right?"]
 
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:

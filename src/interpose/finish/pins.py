@@ -46,12 +46,19 @@ def check(clip: Clip, observation: Observation) -> None:
             raise RequestError(
                 f"the pin of {pin.joint} does not fit",
                 "its frames must be a list of whole numbers, one or more",
+                f'Write Pin("{pin.joint}", [130], [[0.3, 1.4, 0.2]]).',
             )
         if not pin.tolerance > 0:
-            raise RequestError(f"the pin of {pin.joint} does not fit", "its tolerance must be above zero")
+            raise RequestError(
+                f"the pin of {pin.joint} does not fit",
+                f"its tolerance must be above zero, and is {pin.tolerance}",
+                "It is how far the joint may miss, in metres.",
+            )
         if pin.position is None and pin.orientation is None:
             raise RequestError(
-                f"the pin of {pin.joint} says nothing", "it has neither a position nor an orientation"
+                f"the pin of {pin.joint} says nothing",
+                "it has neither a position nor an orientation",
+                "Give one of them, a row for each frame.",
             )
         for value, width in ((pin.position, 3), (pin.orientation, 4)):
             if value is not None and not (
@@ -60,15 +67,21 @@ def check(clip: Clip, observation: Observation) -> None:
                 raise RequestError(
                     f"the pin of {pin.joint} does not fit",
                     f"{len(frames)} frames need as many rows of {width} finite numbers",
+                    "Positions are x, y, z in metres, orientations quaternions w, x, y, z.",
                 )
         outside = (frames < 0) | (frames >= len(clip))
         if outside.any():
             raise RequestError(
                 f"there is no frame {frames[outside][0]} for the pin of {pin.joint}",
                 f"the clip has {len(clip)} frames, counted from 0",
+                "Pin frames inside of a gap.",
             )
         if pin.orientation is not None and np.linalg.norm(pin.orientation, axis=1).min() < 1e-6:
-            raise RequestError(f"the pin of {pin.joint} does not fit", "a quaternion of it is zero")
+            raise RequestError(
+                f"the pin of {pin.joint} does not fit",
+                "a quaternion of it is zero",
+                "No turn is 1, 0, 0, 0.",
+            )
         known = (pin.position is not None) & placed[frames, joint]
         # It is the joint itself that turns.
         known |= (pin.orientation is not None) & (turned | observation.rotation)[frames, joint]

@@ -23,7 +23,8 @@ class Provenance(IntEnum):
     METHOD = 1  # what the method said (solved, where it speaks positions)
     CORRECTED = 2  # the method's, changed by seams or feet
     FALLBACK = 3  # the simpler method's
-    SMOOTHED = 4  # observed, but not fully trusted
+    SMOOTHED = 4  # observed, and changed by `denoise`
+    OPEN = 5  # nowhere: the gap was left open
 
 
 @dataclass(frozen=True)

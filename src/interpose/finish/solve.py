@@ -324,7 +324,7 @@ class Freedom:
 
         def to_parent(vectors: np.ndarray, of: list[int]) -> np.ndarray:
             """Vectors (F, n, 3) of the world in the axes of the parents of n joints."""
-            parents = np.array([skeleton.parents[j] for j in of])
+            parents = np.array([skeleton.parents[j] for j in of], int)
             inside = rotations.rotate(rotations.conjugate(turned[:, np.maximum(parents, 0)]), vectors)
             return np.where(parents[:, None] >= 0, inside, vectors)
 

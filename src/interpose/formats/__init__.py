@@ -113,6 +113,9 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
             the clip is none that the format can hold (.amc needs one read from .amc).
         FileError: the file cannot be written.
     """
+    if not isinstance(clip, Clip):
+        hint = "Give its .clip." if isinstance(getattr(clip, "clip", None), Clip) else "Give a clip."
+        raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
     path = Path(path)
     chosen = _format(path)
     _check_free(path, force)

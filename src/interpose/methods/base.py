@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import unknown
+from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.time import (
     grid,
@@ -66,8 +66,13 @@ class Base:
 
     def for_action(self, action: str) -> Base:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
-        if action not in self.card.labels:
-            raise unknown("action", action, [label for label in self.card.labels if label])
+        labels = [label for label in self.card.labels if label]
+        if not labels:
+            raise RequestError(
+                f"cannot make it {action} with {self.name}", f"{self.name} knows no actions", "Leave it out."
+            )
+        if action not in labels:
+            raise unknown("action", action, labels)
         return Base(self.name, action, self.trained)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:

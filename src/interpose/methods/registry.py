@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
@@ -33,7 +33,8 @@ GROUP = "interpose.methods"
 
 def _offered() -> dict[str, EntryPoint]:
     """Methods of other packages; our own names cannot be taken over."""
-    return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in METHODS}
+    ours = {*METHODS, "auto"}
+    return {entry.name: entry for entry in entry_points(group=GROUP) if entry.name not in ours}
 
 
 def names() -> tuple[str, ...]:
@@ -41,26 +42,34 @@ def names() -> tuple[str, ...]:
     return (*METHODS, *sorted(_offered()))
 
 
-@cache
 def get(name: str) -> Method:
-    """The method of that name, always the same object; of a folder with weights, the method that runs them.
+    """The method of that name, always the same object; of a folder with weights, the method that runs them
+    as they are now.
 
-    Raises RequestError for unknown names (with the list of known ones), and for a method of another package
-    that cannot be loaded.
+    Raises RequestError for unknown names (with the list of known ones), for a method of another package that
+    cannot be loaded, and for a folder that is no model.
     """
+    if name in METHODS or name in _offered():
+        return _named(name)
+    if not (name and Path(name).is_dir()):
+        raise unknown("method", name, [*names(), "a folder with weights"])
+    card = weights.card(name)
+    method: Any = _named(card.method) if card.method in METHODS else None
+    held = {field.name for field in fields(method)} if is_dataclass(method) else set()
+    if "trained" not in held:
+        why = f"its card says that {card.method} runs it, which is no method that runs weights"
+        raise RequestError(f"the folder {name} is no model", why, "Export the weights again.")
+    # By the folder's name where a method can have one: only then can its report be repeated.
+    return cast("Method", replace(method, trained=card, **({"name": name} if "name" in held else {})))
+
+
+@cache
+def _named(name: str) -> Method:
+    """One of our own methods, or of another package's."""
     if name in METHODS:
         module, kind = METHODS[name]
         return getattr(import_module(module), kind)()
-    offered = _offered()
-    if name not in offered and Path(name).is_dir():
-        # By the folder's name where a method can have one: only then can its report be repeated.
-        card = weights.card(name)
-        method: Any = get(card.method)
-        own = {"name": name} if "name" in {field.name for field in fields(method)} else {}
-        return cast("Method", replace(method, trained=card, **own))
-    if name not in offered:
-        raise unknown("method", name, [*names(), "a folder with weights"])
-    entry = offered[name]
+    entry = _offered()[name]
     try:
         return entry.load()()
     except Exception as error:
@@ -104,7 +113,7 @@ def warmed(method: Method, temperature: float) -> Method:
 
 def one_answer(what: str) -> RequestError:
     """That a method has one answer only, and which ones have more."""
-    others = [name for name in names() if isinstance(get(name), Sampler)]
+    others = [name for name in METHODS if isinstance(get(name), Sampler)]
     return RequestError(
         what,
         "it has one answer only",

@@ -6,9 +6,8 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import asdict, dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ FOLDERS = (Path(__file__).parents[3] / "weights", Path(__file__).parents[1] / "w
 # What weights may be asked to be licensed for: "open" are those that may be used for anything.
 LICENCES = ("any", "open")
 OPEN = "any use"  # what the licence of open weights begins with
-_licence: ContextVar[str] = ContextVar("licence", default="any")
+_asked: list[str] = []  # the licences asked for, by everybody who did: the narrowest holds
 
 
 @dataclass(frozen=True)
@@ -89,20 +88,35 @@ class Card:
             return cls(**json.loads(path.read_text()), path=path)
         except (OSError, ValueError, TypeError) as reason:
             raise FileError(
-                f"cannot read the card {path.name}", str(reason), "Install interpose again to restore it."
+                f"cannot read the card {path}",
+                str(reason),
+                "Export the weights again; of interpose's own: install it again.",
             ) from None
 
 
-@cache
 def session(path: Path) -> Any:
-    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is."""
+    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is.
+
+    Raises FileError when the file is damaged.
+    """
+    return _session(path.resolve(), path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=16)
+def _session(path: Path, changed: int) -> Any:
+    """The session of a graph as it was when it was `changed` last."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     options.inter_op_num_threads = 1
     options.log_severity_level = 3  # errors: what it could not fold into constants is nothing to users
-    return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    try:
+        return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
+    except Exception as reason:  # of kinds that ONNX Runtime does not export
+        why = str(reason).partition("\n")[0]
+        fix = "Export the weights again; of interpose's own: install it again."
+        raise FileError(f"cannot read the network {path}", why, fix) from None
 
 
 def folders() -> list[Path]:
@@ -122,13 +136,23 @@ def cards() -> list[Card]:
 
 
 def allow(licence: str) -> None:
-    """From now on use weights of that licence alone, in this context: one of LICENCES.
+    """From now on use weights of that licence alone: one of LICENCES.
 
     Raises RequestError for another one.
     """
     if licence not in LICENCES:
         raise unknown("licence", licence, LICENCES)
-    _licence.set(licence)
+    _asked.append(licence)
+
+
+@contextmanager
+def asked_anew() -> Iterator[None]:
+    """Within it licences may be asked for that are forgotten afterwards."""
+    before = list(_asked)
+    try:
+        yield
+    finally:
+        _asked[:] = before
 
 
 @contextmanager
@@ -136,6 +160,7 @@ def licensed(licence: str) -> Iterator[None]:
     """Within it methods use weights of that licence alone: "open" for those that may be used for anything.
 
     What chooses a method by itself chooses among these; a method whose weights are not among them is refused.
+    It holds for all threads, until whoever asked for it last is through.
 
         with interpose.license("open"):
             done = interpose.fill("take.bvh", "120:160")
@@ -146,17 +171,16 @@ def licensed(licence: str) -> Iterator[None]:
     Raises:
         RequestError: another licence.
     """
-    before = _licence.get()
     allow(licence)
     try:
         yield
     finally:
-        _licence.set(before)
+        _asked.remove(licence)
 
 
 def allowed(card: Card) -> Card:
     """The card, if its weights may be used. RequestError otherwise."""
-    if _licence.get() == "open" and not card.open:
+    if "open" in _asked and not card.open:
         others = [one.method for one in cards() if one.open]
         raise RequestError(
             f"the weights of {card.name} are not open",
@@ -203,6 +227,14 @@ def card(name: str) -> Card:
     for known in cards():
         if known.name == name:
             return known
-    if Path(name).is_dir() and len(found := [*Path(name).glob("*.onnx")]) == 1:
-        return Card.load(found[0].with_suffix(".json"))
-    raise unknown("model", name, [known.name for known in cards()])
+    if not (name and Path(name).is_dir()):
+        raise unknown("model", name, [known.name for known in cards()])
+    found = [*Path(name).glob("*.onnx")]
+    if len(found) != 1:
+        there = " and ".join(sorted(path.name for path in found)) or "none"
+        raise RequestError(
+            f"the folder {name} is no model",
+            f"it would have one .onnx file with its card beside it, and has {there}",
+            "Name the folder that interpose export, or interpose train, wrote.",
+        )
+    return Card.load(found[0].with_suffix(".json"))

@@ -12,6 +12,15 @@ from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 
 
+def frame_number(value: object) -> int:
+    """A frame as a whole number, whatever kind of number says it; RequestError where it is none."""
+    if isinstance(value, int | float | np.number) and math.isfinite(value) and value == int(value):
+        return int(value)
+    raise RequestError(
+        f"there is no frame {str(value)[:40]}", "frames are whole numbers, counted from 0", "Write 120."
+    )
+
+
 @dataclass(frozen=True)
 class Gap:
     """Frames start to stop - 1 in which something is missing.
@@ -23,6 +32,10 @@ class Gap:
     start: int
     stop: int
     joints: tuple[str, ...] | None = None
+
+    def __post_init__(self) -> None:
+        for side in ("start", "stop"):
+            object.__setattr__(self, side, frame_number(getattr(self, side)))
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -106,24 +119,23 @@ class Observation:
         rotation: (F, J) True where the local rotation is known.
         translation: (F, J) True where the local translation is known (the root's is a column of it;
             joints without animated translation are always known).
-        trust: (F, J) 0 to 1, how far an observed value is believed (below 1 for denoising only).
         pins: known global positions.
     """
 
     rotation: np.ndarray
     translation: np.ndarray
-    trust: np.ndarray = None  # type: ignore[assignment]
     pins: tuple[Pin, ...] = field(default=())
 
     def __post_init__(self) -> None:
         fill = object.__setattr__
         fill(self, "rotation", np.asarray(self.rotation, bool))
         fill(self, "translation", np.asarray(self.translation, bool))
-        if self.trust is None:
-            fill(self, "trust", np.ones(self.rotation.shape))
-        same = self.rotation.shape == self.translation.shape == np.shape(self.trust)
-        if not same or self.rotation.ndim != 2:
-            raise RequestError("the observation does not fit", "its arrays must all be (frames, joints)")
+        if self.rotation.shape != self.translation.shape or self.rotation.ndim != 2:
+            raise RequestError(
+                "the observation does not fit",
+                f"its arrays are {self.rotation.shape} and {self.translation.shape}",
+                "Both are (frames, joints), True where a value is known.",
+            )
 
     def check(self, clip: Clip) -> None:
         """RequestError if it has other frames or joints than a clip."""
@@ -170,9 +182,22 @@ class Observation:
         """
         translated = translated or skeleton.roots
         rotation, translation = np.array(rotation, float), np.array(translation, float)
-        for name, values, last in (("rotations", rotation, 4), ("translations", translation, 3)):
-            if values.ndim != 3 or values.shape[-1] != last:
-                raise RequestError(f"{name} do not fit", f"expected (F, n, {last}), got {values.shape}")
+        if not all(0 <= joint < len(skeleton) for joint in translated):
+            raise RequestError(
+                f"there is no joint {max(translated, key=abs)} to be translated",
+                f"the skeleton has {len(skeleton)} joints, counted from 0",
+                "translated lists the joints whose translation is animated, by index.",
+            )
+        for name, values, row in (
+            ("rotations", rotation, (len(skeleton), 4)),
+            ("translations", translation, (len(translated), 3)),
+        ):
+            if values.ndim != 3 or values.shape != (len(rotation), *row):
+                raise RequestError(
+                    f"{name} do not fit",
+                    f"expected (F, {row[0]}, {row[1]}), got {values.shape}",
+                    f"There are {row[0]} of them in each of as many frames as there are rotations.",
+                )
         known = np.isfinite(rotation).all(axis=-1)
         moved = np.ones(known.shape, bool)
         moved[:, list(translated)] = np.isfinite(translation).all(axis=-1)
@@ -223,6 +248,5 @@ class Observation:
             self,
             rotation=self.rotation[start:stop],
             translation=self.translation[start:stop],
-            trust=self.trust[start:stop],
             pins=tuple(one for pin in self.pins if len((one := pin.slice(start, stop)).frames)),
         )

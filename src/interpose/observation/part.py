@@ -10,7 +10,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.observation.observation import Observation
+from interpose.observation.observation import Observation, frame_number
 
 SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
 
@@ -33,6 +33,12 @@ class Part:
     at: int
     joints: tuple[str, ...]
 
+    def __post_init__(self) -> None:
+        fill = object.__setattr__
+        for side in ("start", "stop", "at"):
+            fill(self, side, frame_number(getattr(self, side)))
+        fill(self, "joints", (self.joints,) if isinstance(self.joints, str) else tuple(self.joints))
+
 
 def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Clip, Observation]:
     """The clip with the parts in it, and the observation that knows them.
@@ -49,7 +55,7 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
             here, there = clip.skeleton.index(name), part.clip.skeleton.index(name)
             rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
             known[to, here] = True
-    laid = Observation(known, observation.translation, observation.trust, observation.pins)
+    laid = Observation(known, observation.translation, observation.pins)
     return clip.with_motion(rotation, clip.translation), laid
 
 

@@ -111,6 +111,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     """
     findings: list[Finding] = []
     known = observation or Observation.full(clip)
+    known.check(clip)
     for gap in known.gaps(clip.skeleton):
         findings.append(Finding("missing", gap.joints, gap.start, gap.stop, "no values"))
     if len(clip) > 2:

@@ -225,8 +225,10 @@ def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
     """The length of each gap, None where it is to be chosen."""
     if frames == "auto":
         return [None] * gaps
-    said = [frames] * gaps if isinstance(frames, int) else frames
-    if isinstance(said, str) or not all(isinstance(count, int) and count > 0 for count in said):
+    whole = int | np.integer
+    said = [frames] * gaps if isinstance(frames, whole) else frames
+    counts = isinstance(said, Sequence | np.ndarray) and not isinstance(said, str)
+    if not counts or not all(isinstance(count, whole) and count > 0 for count in said):
         raise RequestError(
             f"cannot generate {frames} frames", "it takes numbers from 1 on, or auto", "Write --frames 45."
         )
@@ -236,7 +238,7 @@ def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
             "each clip but the first has a gap before it, and a loop one more at the end",
             f"Give one length for all, or {gaps}.",
         )
-    return list(said)
+    return [int(count) for count in said]
 
 
 def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:

@@ -10,12 +10,13 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, GapReport, Report, complete, on_rig_of, seams
+from interpose.finish import Completion, GapReport, Provenance, Report, complete, on_rig_of, seams
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
 from interpose.geometry.time import resample
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Part, Pin
+from interpose.observation.observation import frame_number
 from interpose.observation.part import lay, misfits
 from interpose.skeletons import find_humanoid
 from interpose.tasks.moments import mended, momentary, with_moments
@@ -78,7 +79,18 @@ def fill(
     if brief and method in ("auto", "spline"):
         laid, seen = mended(clip, observation, brief)
         rest = fill(
-            laid, seen, method, max_gap, only, seed, methods, progress, action, (), path, (), temperature
+            laid,
+            seen,
+            method,
+            max_gap=max_gap,
+            only=only,
+            seed=seed,
+            methods=methods,
+            progress=progress,
+            action=action,
+            path=path,
+            temperature=temperature,
+            zero=zero,
         )
         return with_moments(rest, clip, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
@@ -87,10 +99,11 @@ def fill(
             "no value of the clip is observed, so any motion would do",
             "Leave at least one frame out of the gaps.",
         )
+    path = _points(path or {})
     whole, clip = clip, _handed(clip, observation)
-    spans(clip, observation, path or ())
+    spans(clip, observation, path)
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
-    for frame in path or {}:
+    for frame in path:
         if any(job.method is None and job.gap.start <= frame < job.gap.stop for job in jobs):
             raise RequestError(
                 f"the path leads through a gap that stays open: frame {frame}",
@@ -98,7 +111,9 @@ def fill(
                 "Leave the point out, or let the gap be filled.",
             )
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
-    provenance = np.zeros(rotation.shape[:2], np.int8)
+    missing = ~observation.rotation
+    missing[:, list(clip.translated)] |= ~observation.translation[:, list(clip.translated)]
+    provenance = np.where(missing, Provenance.OPEN, Provenance.OBSERVED).astype(np.int8)
     said: list[tuple[int, slice, Raw]] = []
     reports: list[GapReport] = []
     limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
@@ -108,7 +123,7 @@ def fill(
         lo, hi = max(0, group.pieces[0].start - margin), min(len(clip), group.pieces[-1].stop + margin)
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
         led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
-        way = {f - lo: np.array(point, float) for f, point in (path or {}).items() if f in led}
+        way = {f - lo: point for f, point in path.items() if f in led}
         # The file tells what its joints can do, and is not what the window is written to.
         window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
         part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo - zero)
@@ -132,6 +147,24 @@ def fill(
     )
 
 
+def _points(path: Mapping[int, Any]) -> dict[int, np.ndarray]:
+    """A path by whole frames, points as arrays (2,); RequestError where it is none."""
+    points = {}
+    for frame, point in path.items():
+        try:
+            place = np.asarray(point, float)
+        except (TypeError, ValueError):
+            place = np.array(np.nan)
+        if place.shape != (2,) or not np.isfinite(place).all():
+            raise RequestError(
+                f"cannot read the point {str(point)[:40]} of the path at frame {frame}",
+                "it is a place on the floor, x and z in metres",
+                "Write {130: (1.2, 0.4)}.",
+            )
+        points[frame_number(frame)] = place
+    return points
+
+
 def fitted(parts: Iterable[Part], clip: Clip) -> list[Part]:
     """Parts on the skeleton of a clip and at its rate, whatever rig and rate they are of.
 
@@ -141,6 +174,8 @@ def fitted(parts: Iterable[Part], clip: Clip) -> list[Part]:
     done = []
     for part in parts:
         whole = part.clip
+        for name in part.joints:
+            clip.skeleton.index(name)
         if misfits(clip, part):
             part = replace(part, clip=on_rig_of(whole, clip))
             if mute := [name for name in part.joints if name not in common(whole, clip)]:

@@ -11,6 +11,7 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion
 from interpose.observation import Gap
+from interpose.observation.observation import frame_number
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
@@ -37,8 +38,8 @@ def between(
     Raises:
         RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
     """
-    chosen = sorted(set(keys))
-    if bad := [key for key in chosen if key != int(key) or not 0 <= key < len(clip)]:
+    chosen = sorted({frame_number(key) for key in keys})
+    if bad := [key for key in chosen if not 0 <= key < len(clip)]:
         raise RequestError(
             f"there is no frame {bad[0]}",
             f"the clip has {len(clip)} frames, counted from 0",

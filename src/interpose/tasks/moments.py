@@ -47,16 +47,19 @@ def mended(clip: Clip, observation: Observation, lost: Observation) -> tuple[Cli
     By a spline, or where what it goes by is no velocity but another spike, by the shortest way.
     """
     hidden, columns = wipe(clip, observation), list(clip.translated)
+    curved = Spline().complete(hidden, observation).clip
 
-    def laid(said: Clip) -> Clip:
-        return clip.with_motion(
-            np.where(lost.rotation[..., None], said.rotation, clip.rotation),
-            np.where(lost.translation[:, columns, None], said.translation, clip.translation),
+    def laid(said: Clip, on: Clip) -> Clip:
+        return on.with_motion(
+            np.where(lost.rotation[..., None], said.rotation, on.rotation),
+            np.where(lost.translation[:, columns, None], said.translation, on.translation),
         )
 
-    mended, straight = laid(Spline().complete(hidden, observation).clip), laid(hidden)
-    for start, stop, (curved, short) in roughness(lost.rotation | lost.translation, mended, straight):
-        if short.max() < CALMER * curved.max():
+    mended, straight = laid(curved, clip), laid(hidden, clip)
+    # What else is missing is judged as it would be completed: what stands there now may be anything.
+    pair = (laid(curved, hidden), hidden)
+    for start, stop, (rough, short) in roughness(lost.rotation | lost.translation, *pair):
+        if short.max() < CALMER * rough.max():
             mended.rotation[start:stop] = straight.rotation[start:stop]
             mended.translation[start:stop] = straight.translation[start:stop]
     known = replace(

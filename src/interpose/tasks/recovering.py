@@ -44,6 +44,10 @@ def recover(
     start, stop = frames or (0, len(clip))
     if frames is not None:
         Gap(start, stop).check(len(clip))
+    if joints is not None and not joints:
+        raise RequestError(
+            "there is no joint to recover", "the list of them is empty", "Leave it out to find what is lost."
+        )
     if place:
         if joints is not None:
             raise RequestError(

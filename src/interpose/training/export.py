@@ -268,6 +268,7 @@ def export_base(
     splits: list[str],
     licence: str | None = None,
     mean: Card | None = None,
+    before: Card | None = None,
 ) -> Card:
     """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
 
@@ -275,6 +276,7 @@ def export_base(
     mean: weights of the same network that the run started from, whose mean with the run's is written
         (Wortsman et al. 2022): what the run learned at the cost of something else, it keeps half of. They are
         measured anew, on the packs' validation performers.
+    before: weights that the run started from and whose data is not among the packs: the card names it, too.
     """
     run = _Run.of(folder)
     settings, log = run.settings, run.log
@@ -294,7 +296,7 @@ def export_base(
         method=name if name in METHODS else "small",  # which runs networks of that kind, of any size
         description="interpose's own network: whatever is missing of a motion",
         licence=licence or _licence(packs),
-        data=_data(packs, splits),
+        data=[*(before.data if before else []), *_data(packs, splits)],
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
         fps=30.0,

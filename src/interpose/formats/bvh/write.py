@@ -7,6 +7,7 @@ from typing import BinaryIO
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.errors import RequestError
 from interpose.formats import angles, place
 from interpose.formats.bvh.header import Header
 from interpose.formats.bvh.read import BvhSource
@@ -15,6 +16,7 @@ from interpose.formats.text import DECIMALS
 from interpose.geometry import rotations
 
 CENTIMETRE = 0.01
+UNWRITTEN = {*"{}\n\r"}  # in names
 
 
 def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
@@ -23,6 +25,8 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     A clip that was read from BVH and still has that skeleton keeps header and layout, and every number that
     did not change keeps its text: the clip's values are compared with those read, bit for bit. Any other clip
     gets a new header: centimetres, Y up, rotation order ZXY, six channels for roots and translated joints.
+
+    Raises RequestError for joint names that BVH cannot hold.
     """
     source = clip.source
     if isinstance(source, BvhSource) and same_skeleton(clip.skeleton, source.skeleton):
@@ -105,6 +109,12 @@ def _put_motion(
 
 def _write_new(clip: Clip, stream: BinaryIO) -> None:
     skeleton = clip.skeleton
+    if bad := [name for name in skeleton.names if not name or UNWRITTEN & {*name}]:
+        raise RequestError(
+            f"cannot write a joint called {bad[0]!r} as BVH",
+            "names in it are one line, and hold no braces",
+            "Rename it, or write .npz.",
+        )
     offsets = skeleton.rest_translation * skeleton.scale_above[:, None] / CENTIMETRE
     order: list[int] = []  # as the hierarchy is written: children directly below their parents
     lines = ["HIERARCHY"]
