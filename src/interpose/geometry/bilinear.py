@@ -44,8 +44,11 @@ def bilinear(a: Array, b: Array, sums: Table) -> Array:
         xp = array_namespace(a, b)
         return xp.matmul(xp.matmul(a, left) * xp.matmul(b, right), out)
     # Products are wider than vectors: long clips are gone through in pieces that fit the cache.
-    shape = np.broadcast_shapes(a.shape[:-1], b.shape[:-1])
-    a, b = (np.broadcast_to(one, (*shape, one.shape[-1])).reshape(-1, one.shape[-1]) for one in (a, b))
+    shape = a.shape[:-1]
+    if b.shape[:-1] != shape:
+        shape = np.broadcast_shapes(shape, b.shape[:-1])
+        a, b = (np.broadcast_to(one, (*shape, one.shape[-1])) for one in (a, b))
+    a, b = a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1])
     done = np.empty((len(a), out.shape[1]), np.result_type(a, b))
     for start in range(0, len(a), ROWS):
         part = slice(start, start + ROWS)
