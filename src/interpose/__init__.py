@@ -267,6 +267,8 @@ def between(
     method: str = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    path: Mapping[int, Any] | None = None,
+    pins: Pin | Sequence[Pin] = (),
 ) -> Completion:
     """Generate the motion between key frames of a clip; the keys come back unchanged, bit for bit.
 
@@ -275,14 +277,16 @@ def between(
             first and after the last key stays as it is.
         keys: frame numbers, two or more.
         action: what the motion is ("walk", ...), for methods that know actions: "small" and "cmib".
-        method, seed, progress: as in `fill`.
+        method, seed, progress, path, pins: as in `fill`.
 
     Returns and raises what `fill` does; RequestError also for keys with nothing between them and for an
     unknown action, with the list of those there are.
     """
     from interpose import tasks
+    from interpose.observation import Pin
 
-    return tasks.between(_clip(clip), keys, action, method, seed, progress)
+    several = [pins] if isinstance(pins, Pin) else list(pins)
+    return tasks.between(_clip(clip), keys, action, method, seed, progress, path=path, pins=several)
 
 
 def forecast(

@@ -35,6 +35,43 @@ def test_an_action_is_told_to_what_fills_best_and_is_replayed(run, take):
     assert first == second
 
 
+def test_a_path_and_pins_between_keys_are_met_and_replayed(run, take):
+    clip = load(take)
+    placed, hand = clip.positions(), clip.skeleton.index("LeftHand")
+    led, pinned = placed[30, 0] + [0.2, 0, 0], placed[60, hand] + [0, 0.15, 0]
+    x, _, z = led / clip.source.unit
+    path, pin = f"30:{x},{z}", "LeftHand@60:" + ",".join(map(str, pinned / clip.source.unit))
+    done = run("between", "take.bvh", "--keys", "10,45,90", "--path", path, "--pin", pin, "--json")
+    assert done.code == 0
+    made = load(take.with_name("take.between.bvh")).positions()
+    assert np.allclose(made[30, 0, [0, 2]], led[[0, 2]], atol=0.01)
+    assert np.allclose(made[60, hand], pinned, atol=0.001)
+    assert [gap["path"] is not None for gap in done.json["gaps"]] == [True, False]
+    assert [gap["pins"] is not None for gap in done.json["gaps"]] == [False, True]
+    assert run("fill", "take.bvh", "--gaps", "take.between.json", "-o", "again.bvh").code == 0
+    first, second = (take.with_name(name).read_bytes() for name in ("take.between.bvh", "again.bvh"))
+    assert first == second
+
+
+def test_a_path_between_poses_of_files_counts_from_the_first(run, take):
+    clip = load(take)
+    where = clip.positions()[35, 0] + [0.1, 0, 0]
+    x, _, z = where / clip.source.unit
+    words = [
+        "between",
+        "--start",
+        "take.bvh#20",
+        "--target",
+        "take.bvh#60",
+        "--frames",
+        "39",
+        "-o",
+        "led.bvh",
+    ]
+    assert run(*words, "--path", f"15:{x},{z}").code == 0
+    assert np.allclose(load(take.with_name("led.bvh")).positions()[15, 0, [0, 2]], where[[0, 2]], atol=0.01)
+
+
 def test_an_unknown_action_is_refused_with_the_choices(run, take):
     done = run("between", "take.bvh", "--keys", "10,40", "--action", "wlk")
     assert done.code == 2

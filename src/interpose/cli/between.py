@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
@@ -26,6 +27,8 @@ def between(
     frames: str | None = None,
     anchor: list[str] = [],  # noqa: B006
     action: str = "",
+    path: list[str] = [],  # noqa: B006
+    pin: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
     license: str = "any",
@@ -48,6 +51,7 @@ def between(
     Try:
       interpose between keys.bvh --keys 0,30,75
       interpose between keys.bvh --keys 0,30,75 --action jumps --player
+      interpose between keys.bvh --keys 0,75 --path 40:35,-120
       interpose between --start walk.bvh --target sit.bvh --frames 45
       interpose between --start walk.bvh#80 --target sit.bvh#0 --frames 45 --anchor turn.bvh#12@20
 
@@ -62,6 +66,10 @@ def between(
             repeated.
         action: what the motion is; `interpose models small` lists what there is. A word does little: another
             key says more.
+        path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit; --start is frame
+            0. May be repeated.
+        pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
+            to hold it there. May be repeated.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
@@ -71,7 +79,7 @@ def between(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method
+    from interpose.cli.request import check_method, path_of, pins_of
 
     check_method(method, license)
     said, others, cut = "", dict[Path, bool](), False
@@ -89,12 +97,17 @@ def between(
     outputs = Outputs.choose(file, output, "between", player)
     for read in (file, *others):
         outputs.check(read, force)
+    zero = chosen[0] if cut else 0
+    points = {zero + frame: point for frame, point in path_of(path, clip).items()}
+    pins = [replace(one, frames=zero + one.frames) for one in pins_of(pin, clip)]
     with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
-        done = tasks.between(clip, chosen, action, method, seed, advance, cut)
+        done = tasks.between(clip, chosen, action, method, seed, advance, cut, points, pins)
     if cut:
         clip = done.clip
     retargeted = [str(path) for path, other in others.items() if other]
-    more = {"retargeted": retargeted} if retargeted else {}
+    more: dict[str, Any] = {"retargeted": retargeted} if retargeted else {}
+    more |= {"path": path} if path else {}
+    more |= {"pinned": pin} if pin else {}
     return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force, more=more)
 
 

@@ -303,6 +303,10 @@ def _pinned(
     way = over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
+        points = [np.linalg.norm(way[f] - p) for f, p in (path or {}).items() if gap.start <= f < gap.stop]
+        if points:
+            missed = 100 * float(max(points))
+            gap = replace(gap, path=missed, notes=(*gap.notes, f"the path is met within {missed:.1f} cm"))
         inside = [one for one in off if gap.start <= one[1] < gap.stop]
         if not inside:
             return gap
@@ -319,10 +323,6 @@ def _pinned(
                 f"flagged: {where[0]} is pinned {far:.1f} m from where it would be at frame {where[1]}: "
                 "is the unit right?"
             )
-        points = [np.linalg.norm(way[f] - p) for f, p in (path or {}).items() if gap.start <= f < gap.stop]
-        if points:
-            notes.append(f"the path is met within {100 * max(points):.1f} cm")
-            gap = replace(gap, path=100 * float(max(points)))
         return replace(gap, pins=max(distance for *_, distance in inside), notes=(*gap.notes, *notes))
 
     reports = [judged(gap) for gap in done.report.gaps]

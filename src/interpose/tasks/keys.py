@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion
-from interpose.observation import Gap
+from interpose.observation import Gap, Pin
 from interpose.observation.observation import frame_number
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
@@ -24,6 +25,8 @@ def between(
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     cut: bool = False,
+    path: Mapping[int, Any] | None = None,
+    pins: Sequence[Pin] = (),
 ) -> Completion:
     """Generate all that lies between key frames of a clip; the keys come back unchanged.
 
@@ -34,6 +37,7 @@ def between(
         action: what the motion is, for methods that know actions.
         method, seed, progress: as in `fill`.
         cut: give back what lies from the first key to the last alone.
+        path, pins: as in `fill`.
 
     Raises:
         RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
@@ -53,7 +57,17 @@ def between(
             "Name some that are apart: 0,30,75. Of a file of poses: --start a.bvh#0 --target a.bvh#1.",
         )
     zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
-    done = fill(clip, gaps, method, seed=seed, progress=progress, action=action, zero=zero)
+    done = fill(
+        clip,
+        gaps,
+        method,
+        seed=seed,
+        progress=progress,
+        action=action,
+        path=path,
+        pins=pins,
+        zero=zero,
+    )
     return _part(done, zero, stop) if cut else done
 
 
