@@ -218,3 +218,21 @@ def test_names_that_bvh_cannot_hold_are_refused(cmu_walk, tmp_path):
     with pytest.raises(interpose.RequestError, match="as BVH"):
         interpose.save(odd, tmp_path / "odd.bvh")
     assert not list(tmp_path.iterdir())
+
+
+def test_who_stands_before_and_after_may_walk_in_between(cmu_walk):
+    """What is known beside a gap tells how far joints may jump, and who stands hardly moves: his steps in the
+    gap are none too far."""
+    pose = cmu_walk.slice(20, 21)
+    still = np.repeat(pose.translation, 110, axis=0)
+    still[:, 0] += 0.001 * np.sin(np.arange(110))[:, None]
+    still[60:, 0, [0, 2]] += 1.5 * _ahead(cmu_walk)
+    clip = pose.with_motion(np.repeat(pose.rotation, 110, axis=0), still)
+    (gap,) = interpose.fill(clip, (20, 70)).report.gaps
+    assert gap.method == "small"
+    assert gap.foot_slide < 40
+
+
+def _ahead(clip):  # type: ignore[no-untyped-def]
+    way = clip.root[-1] - clip.root[0]
+    return way[[0, 2]] / np.linalg.norm(way[[0, 2]])

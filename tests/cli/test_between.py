@@ -180,7 +180,7 @@ def test_a_target_that_lies_still_on_another_body_is_met_at_rest(run, take):
         (["take.bvh"], "nothing between"),
         (["take.bvh", "--keys", "5,6"], "nothing between"),
         (["take.bvh", "--keys", "0,9000"], "no frame 9000"),
-        (["take.bvh", "--keys", "0,ten"], "cannot read the key ten"),
+        (["take.bvh", "--keys", "0,ten"], "cannot read the frame ten"),
         (["take.bvh", "--keys", "0,9", "--start", "take.bvh"], "not clear"),
         (["--start", "take.bvh", "--frames", "5"], "not clear"),
         (["--start", "take.bvh", "--target", "take.bvh", "--frames", "0"], "cannot generate 0"),

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from interpose.formats import load
+
 
 def test_methods_are_played_together_and_measured(run, take):
     before = take.read_bytes()
@@ -60,3 +62,11 @@ def test_errors_have_three_lines(run, take, options, says):
     assert says in done.err
     assert take.with_name("there.html").read_text() == "mine"
     assert not take.with_name("take.compared.html").exists()
+
+
+def test_a_report_is_compared_with_its_path(run, take):
+    clip = load(take)
+    x, _, z = (clip.positions()[70, 0] + [0.2, 0, 0]) / clip.source.unit
+    assert run("fill", "take.bvh", "--gap", "60:80", "--path", f"70:{x},{z}", "--method", "spline").code == 0
+    done = run("compare", "take.bvh", "--gaps", "take.filled.json", "--methods", "linear,spline", "--json")
+    assert [one["gaps"][0]["path"] is not None for one in done.json["compared"]] == [True, True]

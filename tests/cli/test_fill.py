@@ -540,3 +540,16 @@ def test_times_in_seconds_and_where_joints_are(run, take):
     assert np.abs(off).max() < 0.002
     assert run("fill", "take.bvh", "--gap", "80:100", "--pin", f"LeftHand@99s:{place}").code == 2
     assert "there is no frame" in run("skeleton", "take.bvh", "--at", "99s").err
+
+
+def test_a_dry_run_checks_and_lists_the_path(run, take):
+    words = ["fill", "take.bvh", "--gap", "60:90", "--dry-run"]
+    assert run(*words, "--path", "20:1,2").code == 2
+    assert "70:1,2" in run(*words, "--path", "70:1,2").out
+    assert run(*words, "--path", "70:1,2", "--json").json["path"] == ["70:1,2"]
+
+
+def test_a_layer_of_nothing_is_refused(run, take):
+    done = run("fill", "take.bvh", "--layer", "--gap", "60:90", "--joints", "RightArm")
+    assert done.code == 2
+    assert "--from" in done.err

@@ -57,7 +57,7 @@ def between(
 
     Args:
         file: the clip (.bvh, .npz, .amc).
-        keys: the frames of the file that are keys, separated by commas, counted from 0.
+        keys: the frames of the file that are keys, separated by commas, counted from 0; or seconds, 1s,2.5s.
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
         frames: how many frames to generate between --start and --target; auto, the default, proposes it (from
@@ -79,12 +79,13 @@ def between(
         force: replace existing files, of .json files only reports.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method, path_of, pins_of
+    from interpose.cli.request import check_method, frame_of, path_of, pins_of
 
     check_method(method, license)
     said, others, cut = "", dict[Path, bool](), False
     if file is not None and not (start or target or frames or anchor):
-        chosen, clip = [_frame(text) for text in split_names(keys)], reading.load(file)
+        clip = reading.load(file)
+        chosen = [frame_of(text, clip) for text in split_names(keys)]
     elif file is None and not keys and start and target:
         file, chosen, clip, said, others = _blocked(start, target, frames or "auto", anchor, reading)
         cut = True
@@ -109,12 +110,6 @@ def between(
     more |= {"path": path} if path else {}
     more |= {"pinned": pin} if pin else {}
     return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force, more=more)
-
-
-def _frame(text: str) -> int:
-    if not text.isdecimal():
-        raise RequestError(f"cannot read the key {text}", "it is no frame number", "Write --keys 0,30,75.")
-    return int(text)
 
 
 def _blocked(

@@ -63,7 +63,7 @@ def compare(
         force: replace an existing page.
     """
     from interpose import tasks
-    from interpose.cli.request import check_method, from_options
+    from interpose.cli.request import check_method, from_options, path_of, pins_of
     from interpose.observation import Observation
 
     chosen = list(dict.fromkeys(split_names(methods) or USUAL))
@@ -76,14 +76,16 @@ def compare(
     for name in chosen:
         check_method(name, license)
     clip = reading.load(file)
-    asked = from_options(file, clip, gap, joints, gaps, reading).gaps
+    request = from_options(file, clip, gap, joints, gaps, reading)
+    asked, points, pins = request.gaps, path_of(request.path, clip), pins_of(request.pins, clip)
+    parts = [one.part for one in request.parts]
     page = output or file.with_name(f"{file.stem}.compared.html")
     _check(page, force)
     jobs = tasks.plan(clip, Observation.from_gaps(clip, asked), "auto", None, None, {})
     done: dict[str, Completion] = {}
     with progress(f"comparing {len(chosen)} methods", len(chosen) * sum(map(len, asked))) as advance:
         for i, name in enumerate(chosen):
-            made = tasks.fill(clip, asked, name, seed=seed)
+            made = tasks.fill(clip, asked, name, seed=seed, parts=parts, path=points, pins=pins)
             # Of the usual ones those are left out that some other method stood in for.
             if methods or any(one.method == name for one in made.report.gaps):
                 done[name] = made

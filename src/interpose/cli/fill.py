@@ -113,6 +113,12 @@ def fill(
     parts = part_of(from_, from_range, at, joints, clip, reading)
     if layer and not gap:
         gap = layered(parts, clip)
+    if layer and from_ is None:
+        raise RequestError(
+            "no other clip is named",
+            "--layer lays joints of another clip over the motion",
+            "Name it with --from FILE.",
+        )
     if parts and not gap and gaps is None:
         raise RequestError(
             f"no gap of {file.name} is named for --from",
@@ -138,7 +144,7 @@ def fill(
     ]
     outputs = Outputs.choose(file, output, "filled", player)
     if dry_run:
-        return _dry_run(file, clip, request, pins, max_gap, outputs, json, force, gaps)
+        return _dry_run(file, clip, request, points, pins, max_gap, outputs, json, force, gaps)
     for read in (file, *(one.file for one in request.parts)):
         outputs.check(read, force, gaps)
     missing = sum(map(len, request.gaps))
@@ -181,6 +187,7 @@ def _dry_run(
     file: Path,
     clip: Clip,
     request: Request,
+    points: dict[int, Any],
     pins: list[Pin],
     max_gap: int | None,
     outputs: Outputs,
@@ -190,12 +197,14 @@ def _dry_run(
 ) -> int:
     """Say what would be done."""
     from interpose import tasks
+    from interpose.finish.path import spans
     from interpose.observation import Observation
     from interpose.observation.part import lay
 
     parts = [one.part for one in request.parts]
     clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), parts)
     seen = replace(seen, pins=tuple(pins))
+    spans(clip, seen, points)
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
     code = 4 if request.left or any(job.method is None for job in jobs) else 0
     if as_json:
@@ -209,7 +218,8 @@ def _dry_run(
             for job in jobs
         ]
         files = [str(path) for path in outputs.all]
-        more = {"left": request.left} if request.left else {}
+        more = {"path": request.path, "pinned": request.pins, "left": request.left}
+        more = {name: value for name, value in more.items() if value}
         say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files, **more})
         return code
     say("\n".join(describe(file, clip)))
@@ -230,6 +240,9 @@ def _dry_run(
         ],
         right=("gap", "frames", "length"),
     )
+    for what, told in (("led over", request.path), ("pinned", request.pins)):
+        if told:
+            say(f"{what}: {'  '.join(told)}")
     say()
     say(outputs.told(dry_run=True))
     try:

@@ -25,6 +25,8 @@ UNITS = {
     "seam_before": "cm/frame^2",
     "seam_after": "cm/frame^2",
     "seam_limit": "cm/frame^2",
+    "peak": "cm/frame^2",
+    "peak_limit": "cm/frame^2",
     "bone_deviation": "cm",
     "foot_slide": "cm/s",
     "foot_slide_before": "cm/s",

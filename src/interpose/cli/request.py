@@ -191,9 +191,6 @@ def part_of(
 
 def layered(parts: list[Lent], clip: Clip) -> list[str]:
     """The gap in which --layer lays the part: with what it takes to ease it in and out."""
-    if not parts:
-        why = "--layer lays joints of another clip over the motion"
-        raise RequestError("no other clip is named", why, "Name it with --from FILE.")
     part, over = parts[0].part, max(2, round(EASED * clip.fps))
     end = part.at + part.stop - part.start
     if end > len(clip):

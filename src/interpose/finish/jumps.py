@@ -15,8 +15,9 @@ from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.observation import Gap, Observation
 
-# Metres a second squared by which velocities may jump inside of any gap: what a person does who sets off.
-SETS_OFF = 20.0
+# Metres a second squared by which velocities may jump inside of any gap: toes of who walks do by 48, and
+# beside a gap he may have stood.
+SETS_OFF = 60.0
 # Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do; the
 # share of a gap beyond which that is no mending; and the jump (metres a second squared) that is mended even
 # where nothing tells how the motion itself jumps. Between poses that face away from each other networks may
