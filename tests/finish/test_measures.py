@@ -104,6 +104,18 @@ def test_a_hand_under_the_floor_is_said(cmu_walk):
     assert "under the floor at frame 2" in note  # counted from 100
 
 
+def test_what_jumps_as_hardly_any_motion_does_is_told_by_joint_and_frame(cmu_walk):
+    """Between lone keys nothing tells how the motion itself jumps."""
+    gap = Gap(50, 80)
+    known = Observation.from_gaps(cmu_walk, [gap])
+    assert notes.wild(cmu_walk, known, gap, 0) == []
+    rotation, arm = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftForeArm")
+    rotation[60:, arm] = rotations.multiply(rotations.about("X", np.array(1.5)), rotation[60:, arm])
+    (told,) = notes.wild(cmu_walk.with_motion(rotation, cmu_walk.translation), known, gap, 100)
+    assert told.startswith("flagged: Left")
+    assert "at frame 159" in told or "at frame 160" in told
+
+
 def test_who_goes_backwards_or_hurries_is_told(cmu_walk):
     """A pose that goes where it faces at 1.2 m/s; in the gap as fast, back at 2, or at 4."""
     body, gap = find_humanoid(cmu_walk), Gap(60, 120)

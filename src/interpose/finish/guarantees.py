@@ -594,6 +594,7 @@ def _report(
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),
             *notes.hasty(finished, known, gap, first),
+            *([] if bounds else notes.wild(finished, known, gap, first)),
             *notes.doubtful(risk, gap, first, ahead),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
             *notes.rests(never, span.method),

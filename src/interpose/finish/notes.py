@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
-from interpose.finish import feet, floor, measures
+from interpose.finish import feet, floor, measures, seams
 from interpose.finish.windows import grow
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -39,6 +39,8 @@ BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 1.2, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
+# Metres a second squared by which velocities jump where feet land and hands strike, and seldom else.
+WILD = 100.0
 
 
 def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
@@ -71,6 +73,20 @@ def sized(skeleton: Skeleton) -> list[str]:
     if not np.isfinite(leg) or LEGS[0] <= leg <= LEGS[1]:
         return []
     return [f"flagged: its legs are {leg:.3g} m long: is the unit right?"]
+
+
+def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """A note where a joint's velocity jumps by more than in hardly any motion, in a gap beside which nothing
+    tells how the motion itself jumps."""
+    frames = np.arange(max(gap.start, 1), min(gap.stop, len(finished) - 1))
+    if not frames.size:
+        return []
+    size = np.linalg.norm(seams.jumps(finished, known, frames), axis=-1) * finished.fps**2
+    row, joint = np.unravel_index(int(size.argmax()), size.shape)
+    if size[row, joint] <= WILD * feet.size(finished.skeleton):
+        return []
+    where = f"{finished.skeleton.names[joint]} jumps at frame {first + int(frames[row])}"
+    return [f"flagged: {where}, by {size[row, joint]:.0f} m/s^2. More frames, or a key near there, help"]
 
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:
