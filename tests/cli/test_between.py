@@ -72,6 +72,19 @@ def test_a_path_between_poses_of_files_counts_from_the_first(run, take):
     assert np.allclose(load(take.with_name("led.bvh")).positions()[15, 0, [0, 2]], where[[0, 2]], atol=0.01)
 
 
+def test_a_rest_pose_that_leads_a_file_is_no_target_but_by_its_number(run, take):
+    clip = load(take)
+    rotation = clip.rotation.copy()
+    rotation[0] = clip.skeleton.rest_rotation
+    save(clip.with_motion(rotation, clip.translation), take.with_name("led.bvh"))
+    words = ["between", "--start", "take.bvh#60", "--frames", "20"]
+    done = run(*words, "--target", "led.bvh", "-o", "one.bvh")
+    assert done.code == 0
+    assert "frame 1 is taken" in done.out
+    assert np.allclose(load(take.with_name("one.bvh")).rotation[-1], rotation[1], atol=1e-5)
+    assert "is taken" not in run(*words, "--target", "led.bvh#0", "-o", "two.bvh").out
+
+
 def test_an_unknown_action_is_refused_with_the_choices(run, take):
     done = run("between", "take.bvh", "--keys", "10,40", "--action", "wlk")
     assert done.code == 2

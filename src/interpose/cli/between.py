@@ -132,10 +132,15 @@ def _blocked(
     clips = [before, *(on_rig_of(clip, before) for clip in loaded[1:])]
     others = {path: clip is not own for (path, _), clip, own in zip(named[1:], clips[1:], loaded[1:])}
     said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
-    at = [
-        _moment(path, frame, clip, -1 if k == 0 else 0)
-        for k, ((path, frame), clip) in enumerate(zip(named, clips))
-    ]
+    at = []
+    for k, ((path, frame), clip) in enumerate(zip(named, clips)):
+        number = _moment(path, frame, clip, -1 if k == 0 else 0)
+        if frame is None and number in strays(clip):
+            odd, number = number, number + (-1 if k == 0 else 1)
+            said.append(
+                f"frame {odd} of {path} has nothing to do with the one beside: frame {number} is taken"
+            )
+        at.append(number)
     last, after, first = at[0], clips[1], at[1]
     held = _frame_of(before, last)
     poses = {0: held}
