@@ -85,6 +85,18 @@ def test_a_rest_pose_that_leads_a_file_is_no_target_but_by_its_number(run, take)
     assert "is taken" not in run(*words, "--target", "led.bvh#0", "-o", "two.bvh").out
 
 
+def test_what_lies_beside_a_blocked_pose_tells_no_velocity(run, take):
+    """In a file of keys another pose may follow at once."""
+    clip = load(take)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[61:], translation[61:] = rotation[20], translation[20]
+    translation[61:, 0, 0] += 2.0
+    save(clip.with_motion(rotation, translation), take.with_name("keys.bvh"))
+    words = ["between", "--start", "take.bvh#30", "--target", "keys.bvh#60", "--frames", "30", "--json"]
+    (gap,) = run(*words).json["gaps"]
+    assert not any("seam" in note for note in gap["notes"])
+
+
 def test_an_unknown_action_is_refused_with_the_choices(run, take):
     done = run("between", "take.bvh", "--keys", "10,40", "--action", "wlk")
     assert done.code == 2

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.console import progress
@@ -15,6 +16,8 @@ from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
+
+FASTEST = 20.0  # metres a second: no hand goes so fast
 
 
 def between(
@@ -171,6 +174,9 @@ def _blocked(
     # Rest poses and the like at the ends of files tell nothing of how it moves.
     since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
     until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
+    # Nor does another pose beside one that is blocked.
+    since = since if since < last and _goes_on(before.slice(last - 1, last + 1)) else last
+    until = until if until > moment + 1 and _goes_on(beside.slice(moment, moment + 2)) else moment + 1
     # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
     laid, lay = (
         hips[0, hips_of(held.skeleton)]
@@ -186,6 +192,11 @@ def _blocked(
         "\n".join(said),
         others,
     )
+
+
+def _goes_on(clip: Clip) -> bool:
+    """Whether a body may have moved so from the one frame of a clip to the other."""
+    return bool(np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1).max() * clip.fps < FASTEST)
 
 
 def _met(text: str) -> tuple[str, int]:
