@@ -106,6 +106,12 @@ def fill(
         roles_of,
     )
 
+    if layer and from_ is None:
+        raise RequestError(
+            "no other clip is named",
+            "--layer lays joints of another clip over the motion",
+            "Name it with --from FILE.",
+        )
     if from_ is None:
         clip = reading_of(gaps, reading).load(file, roles_of(gaps))
     else:
@@ -113,12 +119,6 @@ def fill(
     parts = part_of(from_, from_range, at, joints, clip, reading)
     if layer and not gap:
         gap = layered(parts, clip)
-    if layer and from_ is None:
-        raise RequestError(
-            "no other clip is named",
-            "--layer lays joints of another clip over the motion",
-            "Name it with --from FILE.",
-        )
     if parts and not gap and gaps is None:
         raise RequestError(
             f"no gap of {file.name} is named for --from",
