@@ -35,7 +35,7 @@ BESIDE = 0.1
 # performer goes so at more than BACK (metres a second) in 1 % of 956 pieces of 2 s, and at more than
 # HURRIES times the fastest pace of the seconds around it, or of SLOW (metres a second: who stands may walk
 # off), in less than that. EVEN: seconds over which paces are evened out.
-BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 1.2, 0.1
+BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 1.4, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
