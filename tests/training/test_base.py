@@ -449,6 +449,18 @@ def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path):
     )
 
 
+def test_a_run_on_more_data_learns_their_labels_too(walk_pack, tmp_path):
+    tiny = BaseSettings(width=24, layers=1, batch=2, longest=40, labelled=1, every_seconds=1e9)
+    packs = [walk_pack("lafan1", both=True)]
+    train_base(packs, tmp_path / "first", Budget.parse("3steps"), tiny)
+    export_base(tmp_path / "first", packs, tmp_path / "weights", ["train"])
+    card = weights.load(tmp_path / "weights", "small")
+    packs.append(replace(walk_pack("bandai", both=True), labels=np.array(["bow", "bow"])))
+    model = train_base(packs, tmp_path / "second", Budget.parse("3steps"), tiny, start=card)
+    assert model.config.labels == ("", "walk", "bow")
+    assert model.encoder.label.weight[2].any()
+
+
 def test_a_run_for_a_wider_network_begins_with_the_one_it_starts_from(walk_pack, tmp_path):
     pack = walk_pack("lafan1", both=True)
     first = BaseSettings(width=24, layers=1, batch=2, longest=40, near=0, every_seconds=1e9)

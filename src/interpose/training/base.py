@@ -310,7 +310,7 @@ def train_base(
     device = pick_device()
     torch.manual_seed(settings.seed)
     kept = chosen(packs, settings.datasets)
-    labels = tuple(start.labels) if start else labels_of(kept, splits)
+    labels = labels_of(kept, splits, start.labels if start else ("",))
     poses = Poses(kept, splits, labels, SHORTEST, device)
     # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)

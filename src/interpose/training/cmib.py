@@ -130,8 +130,7 @@ def train_cmib(
             "Choose --set longest=131 or less.",
         )
     torch.manual_seed(settings.seed)
-    before = tuple(start.labels) if start else ()
-    labels = before + tuple(label for label in labels_of(packs, splits) if label not in before)
+    labels = labels_of(packs, splits, start.labels if start else ("",))
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6

@@ -47,10 +47,13 @@ class Batch:
         return kinematics.forward(kinematics.local_rotations(self.rotation, PARENTS), move, PARENTS)[1]
 
 
-def labels_of(packs: Sequence[Pack], splits: Sequence[str]) -> tuple[str, ...]:
-    """All labels of the clips of some splits, sorted; "" first, for motions without one."""
+def labels_of(packs: Sequence[Pack], splits: Sequence[str], before: Sequence[str] = ("",)) -> tuple[str, ...]:
+    """All labels of the clips of some splits, sorted, after those of `before`.
+
+    "" is for motions without one; a run that starts from weights keeps theirs, in their order.
+    """
     found = {str(x) for pack in packs for x, s in zip(pack.labels, pack.splits) if s in splits}
-    return ("", *sorted(found - {""}))
+    return (*before, *sorted(found - {*before}))
 
 
 class Poses:
