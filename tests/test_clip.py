@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -136,3 +138,9 @@ def test_slices_and_new_motion():
     assert other.source == "layout"
     assert (whole.translation == 0).all()
     assert whole.seconds == pytest.approx(5 / 30)
+
+
+def test_roots_cannot_be_left_out_of_what_is_translated():
+    whole = clip()
+    with pytest.raises(RequestError, match="is not translated"):
+        replace(whole, translation=whole.translation[:, :1], translated=(0,))

@@ -551,3 +551,28 @@ def test_a_network_says_of_every_new_frame_which_feet_stand(cmu_walk, fps):
     step = fps // 30
     assert np.abs(fine[::step] - coarse).max() < 0.35
     assert np.abs(fine[:step] - coarse[0]).max() < 0.35, "nothing is mixed with what was never said"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"stands": np.ones((7, 4))}, {"expected": np.ones(7)}, {"translated": (0, 1)}]
+)
+def test_a_method_that_gives_something_else_is_named(cmu_walk, wrong):
+    class Odd(type(registry.get("linear"))):  # type: ignore[misc]
+        name = "odd"
+
+        def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+            raw = super().complete(clip, observation, seed)
+            if "translated" not in wrong:
+                return replace(raw, **wrong)
+            more = np.repeat(raw.clip.translation, 2, axis=1)
+            return replace(raw, clip=replace(raw.clip, translation=more, **wrong))
+
+    seen = Observation.from_gaps(cmu_walk, [Gap(70, 100)])
+    with pytest.raises(RequestError, match="the method odd does not work"):
+        complete(cmu_walk, seen, Odd())
+
+
+def test_a_part_of_what_a_method_said_is_of_its_frames(cmu_walk):
+    done = tasks.between(cmu_walk, [40, 80], cut=True)
+    assert done.raw.stands is not None
+    assert len(done.raw.stands) == len(done.raw.expected) == len(done.raw.clip) == len(done.clip) == 41

@@ -112,6 +112,11 @@ class Skeleton:
         return tuple(path)
 
     @cached_property
+    def below(self) -> np.ndarray:
+        """(J, J) True where the row's joint is the column's, or hangs below it."""
+        return np.asarray(kinematics.ancestors(self.parents).values, bool)
+
+    @cached_property
     def scale_above(self) -> np.ndarray:
         """(J,) product of the scales of all ancestors: what a bone vector is multiplied with."""
         above = np.ones(len(self))
@@ -169,6 +174,12 @@ class Clip:
                 f"there is no joint {max(self.translated, key=abs)} to be translated",
                 f"the skeleton has {joints} joints, counted from 0",
                 "translated lists the joints whose translation is animated, by index.",
+            )
+        if left := [joint for joint in self.skeleton.roots if joint not in self.translated]:
+            raise RequestError(
+                f"the root {self.skeleton.names[left[0]]} is not translated",
+                f"translated lists the joints {', '.join(map(str, self.translated))}",
+                "The roots belong to it; leave it out where nothing else does.",
             )
         if self.translation.shape != (frames, len(self.translated), 3):
             raise RequestError(

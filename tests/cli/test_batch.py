@@ -72,8 +72,9 @@ def test_results_go_into_a_folder_and_folders_within_folders_are_looked_into(run
     names = ["takes/a.bvh", "takes/b.bvh", "takes/day/c.bvh", "takes/day/d.bvh"]
     assert [one["input"] for one in done.json] == names
     assert run("fill", "takes", "--method", "spline", "-o", "done/").code == 3
-    made = sorted(path.name for path in (takes.parent / "done").iterdir())
-    assert made == ["b.bvh", "b.json", "d.bvh", "d.json"]
+    done = takes.parent / "done"
+    made = sorted(str(path.relative_to(done)) for path in done.rglob("*.*"))
+    assert made == ["b.bvh", "b.json", "day/d.bvh", "day/d.json"]
     assert not [*takes.rglob("*.filled.*")]
 
 
@@ -96,3 +97,25 @@ def test_what_another_verb_restores_is_said_of_each_clip(run, takes):
     done = run("fill", "takes", "--method", "spline", "--json")
     assert done.code == 4
     assert "hips that stand still, which `interpose recover` restores" in done.json[0]["left"]
+
+
+def test_takes_of_one_name_in_two_folders_stay_apart(run, takes):
+    (takes / "c.bvh").unlink()
+    (takes / "a.bvh").unlink()
+    (takes / "day").mkdir()
+    shutil.copy(takes / "b.bvh", takes / "day" / "b.bvh")
+    assert run("fill", "takes", "--method", "spline", "-o", "takes/done").code == 0
+    made = sorted(str(path.relative_to(takes / "done")) for path in (takes / "done").rglob("*.bvh"))
+    assert made == ["b.bvh", "day/b.bvh"]
+    # What lies in the folder of results is none of the takes.
+    assert run("fill", "takes", "--method", "spline", "-o", "takes/done", "--force").code == 0
+    assert not (takes / "done" / "done").exists()
+    done = run("fill", "takes/b.bvh", "takes/day/b.bvh", "-o", "flat")
+    assert done.code == 2
+    assert "two results would have one name" in done.err
+
+
+def test_a_take_with_a_dot_in_its_name_is_a_take(run, takes):
+    (takes / "c.bvh").rename(takes / "b.take2.bvh")
+    done = run("scan", "takes", "--json")
+    assert [one["input"] for one in done.json] == ["takes/a.bvh", "takes/b.bvh", "takes/b.take2.bvh"]

@@ -553,3 +553,11 @@ def test_a_layer_of_nothing_is_refused(run, take):
     done = run("fill", "take.bvh", "--layer", "--gap", "60:90", "--joints", "RightArm")
     assert done.code == 2
     assert "--from" in done.err
+
+
+def test_a_report_of_a_clip_of_other_frames_is_refused(run, take):
+    """As that of two poses, which names the file of the first: its gap is in what was made of them."""
+    assert run("between", "--start", "take.bvh#20", "--target", "take.bvh#60", "--frames", "20").code == 0
+    done = run("fill", "take.bvh", "--gaps", "take.between.json")
+    assert done.code == 2
+    assert "it is of a clip of 22 frames" in done.err

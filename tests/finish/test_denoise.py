@@ -13,6 +13,7 @@ from interpose.evaluation.denoising import UNIT, drop, shake, tremble
 from interpose.finish import Provenance, feet, measures
 from interpose.finish.denoise import deviation
 from interpose.geometry import rotations
+from interpose.geometry.time import resample
 from interpose.skeletons import find_mapping
 
 
@@ -209,3 +210,11 @@ def test_frames_that_are_noisy_among_others_are_denoised_by_their_own_noise(cmu_
     (frames,) = done.report.noise.noisy
     assert all(abs(int(said) - true) < 10 for said, true in zip(frames.split(":"), (80, 130)))
     assert tasks.denoise(clip).report.noise.noisy == ()
+
+
+def test_few_frames_a_second_are_refused(cmu_walk):
+    """A clean jump at 15 frames a second would be moved by 20 cm."""
+    with pytest.raises(RequestError, match="cannot be denoised"):
+        interpose.denoise(resample(cmu_walk, 15.0))
+    slow = resample(cmu_walk, 24.0)
+    assert _apart(interpose.denoise(slow).clip, slow).max() < 0.5

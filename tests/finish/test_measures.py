@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from interpose import tasks
+from interpose.clip import Clip, Skeleton
 from interpose.finish import complete, feet, measures, notes
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
@@ -129,3 +130,19 @@ def test_who_goes_backwards_or_hurries_is_told(cmu_walk):
         clip = cmu_walk.with_motion(rotation, translation)
         said = notes.hasty(clip, Observation.from_gaps(clip, [gap]), gap, 0)
         assert [word in note for note in said] == [True] * bool(word)
+
+
+def test_a_pose_that_glides_below_a_root_that_stays_is_no_life(cmu_walk):
+    """The bones of a game rig hang on an armature that stays where it is."""
+    body = cmu_walk.skeleton
+    rig = Skeleton(
+        ("Armature", *body.names),
+        (-1, *(parent + 1 for parent in body.parents)),
+        np.concatenate([np.zeros((1, 3)), body.rest_translation]),
+    )
+    still = cmu_walk.rotation.copy()
+    still[75:135] = still[74]
+    turned = np.concatenate([rotations.identity(len(still), 1), still], axis=1)
+    placed = np.concatenate([np.zeros((len(still), 1, 3)), cmu_walk.translation[:, :1]], axis=1)
+    clip = Clip(rig, turned, placed, 30.0, translated=(0, 1))
+    assert notes.liveliness(clip, Gap(75, 135)) < 1e-9

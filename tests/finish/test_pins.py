@@ -11,7 +11,10 @@ from interpose import tasks
 from interpose.errors import RequestError
 from interpose.finish import feet, pins, seams
 from interpose.geometry import rotations
+from interpose.methods.base import pinned
 from interpose.observation import Gap, Observation, Pin
+from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons.humanoid import reflect
 
 GAP = Gap(70, 100)
 ARM = ("LeftArm", "LeftForeArm", "LeftHand")
@@ -219,3 +222,38 @@ def test_one_joint_at_two_places_is_refused(cmu_walk):
     with pytest.raises(RequestError, match="two places at frame 85"):
         tasks.fill(cmu_walk, [GAP], "spline", pins=[there, elsewhere])
     tasks.fill(cmu_walk, [GAP], "spline", pins=[there, replace(there)])
+
+
+@pytest.mark.parametrize("method", ["small", "spline"])
+def test_pins_of_a_left_handed_clip_mean_what_they_do_in_its_mirror_image(cmu_walk, method):
+    right = cmu_walk.slice(40, 130)
+    left = reflect(right)
+    pin = lifted(right, frame=45)
+    mirrored = replace(pin, position=pin.position * [-1.0, 1.0, 1.0])
+    one, other = (
+        tasks.fill(clip, [Gap(30, 60)], method, pins=[own]).clip.positions()
+        for clip, own in ((right, pin), (left, mirrored))
+    )
+    np.testing.assert_allclose(other * [-1.0, 1.0, 1.0], one, atol=1e-4)
+
+
+def test_what_the_network_is_told_of_pins(cmu_walk):
+    """The joint's row, the nearest of its frames, and the place on the scaled body, mirrored where it is."""
+    mapping = find_mapping(cmu_walk.skeleton)
+    pin = Pin("LeftHand", np.array([41]), np.array([[0.5, 1.0, 2.0]]))
+    observation = replace(Observation.from_gaps(cmu_walk, [GAP]), pins=(pin,))
+    places, said = pinned(observation, mapping, np.arange(0.0, 200.0, 4.0), np.array([-2.0, 2.0, 2.0]))
+    assert np.argwhere(said).tolist() == [[10, JOINTS.index("LeftHand")]]
+    np.testing.assert_allclose(places[10, JOINTS.index("LeftHand")], [-1.0, 2.0, 4.0])
+
+
+def test_turns_past_half_a_turn_go_on_the_same_way(cmu_walk):
+    """Pinned at 170, 180 and 190 degrees from where it turns by itself a head goes on, a degree a frame."""
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    head, frames = cmu_walk.skeleton.index("Head"), np.array([75, 85, 95])
+    turned = free.kinematics()[0][frames, head]
+    off = rotations.about("Y", np.radians([170.0, 180.0, 190.0]))
+    pin = Pin("Head", frames, orientation=rotations.multiply(off, turned))
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip.kinematics()[0][75:96, head]
+    assert rotations.angle(done[[0, 10, 20]], pin.orientation).max() < 1e-3
+    assert np.degrees(rotations.angle(done[1:], done[:-1]).max()) < 10

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Pin
 
 SKELETON = Skeleton(("hips", "spine", "arm", "hand"), (-1, 0, 1, 2), np.zeros((4, 3)))
 
@@ -100,3 +102,20 @@ def test_shapes_must_agree():
 def test_slices():
     seen = Observation.from_gaps(motion(), [Gap(2, 4)]).slice(3, 6)
     assert (seen.frames == [False, True, True]).all()
+
+
+def test_one_joint_may_be_named_as_it_is(cmu_walk):
+    assert Gap(20, 30, "LeftArm") == Gap(20, 30, ["LeftArm"]) == Gap(20, 30, ("LeftArm",))
+    assert not Observation.from_gaps(cmu_walk, [Gap(20, 30, "LeftArm")]).complete
+
+
+@pytest.mark.parametrize("text", ["1e308s:2s", "0s:1e308s", "nans:2s", "1s:infs", f"0:{'9' * 5000}"])
+def test_times_beyond_all_numbers_are_refused(cmu_walk, text):
+    with pytest.raises(RequestError, match="cannot read the gap"):
+        Gap.parse(text, clip=cmu_walk)
+
+
+def test_pins_can_be_compared():
+    pin = Pin("LeftHand", np.arange(3), np.zeros((3, 3)))
+    assert pin == pin
+    assert pin != replace(pin, tolerance=1.0)

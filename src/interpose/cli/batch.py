@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, redirect_stdout
 from functools import wraps
 from io import StringIO
@@ -12,9 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from interpose.cli.console import complain, console, say, say_json
+from interpose.cli.outputs import MADE
 from interpose.errors import FileError, InterposeError, NothingError, RequestError
 
 MOTION = (".bvh", ".npz", ".amc")
+# take.filled.bvh and take.forecast.2.bvh lie beside the take.bvh that they were made of.
+PRODUCT = re.compile(rf"(.+)\.(?:{'|'.join(MADE)})(?:\.\d+)?")
 
 
 def each(verb: Callable[..., int | None]) -> Callable[..., int]:
@@ -27,10 +31,11 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
     def many(file: Path, /, *more: Path, **options: Any) -> int:
         if not more and not file.is_dir():
             return verb(file, **options) or 0
-        files = [*{path.resolve(): path for path in clips((file, *more))}.values()]
+        folder: Path | None = options.get("output")
+        found = {path.resolve(): (path, place) for path, place in clips((file, *more), folder)}
+        files = [path for path, _ in found.values()]
         if files == [file] and file.is_dir():
             raise _empty(file)
-        folder: Path | None = options.get("output")
         if folder is not None and not folder.exists() and folder.suffix.lower() not in MOTION:
             if not options.get("dry_run"):
                 folder.mkdir(parents=True)
@@ -40,14 +45,18 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 f"{len(files)} files are to be written",
                 "Name a folder; or leave it out: each lies beside what it was made of.",
             )
+        if folder is not None:
+            _apart([*found.values()])
         codes, reports = [], []
-        for path in files:
+        for path, place in found.values():
             said = StringIO()
-            if folder is not None:
-                options["output"] = folder / path.name
             try:
                 if path.is_dir():
                     raise _empty(path)
+                if folder is not None:
+                    options["output"] = folder / place
+                    if not options.get("dry_run"):
+                        options["output"].parent.mkdir(parents=True, exist_ok=True)
                 with redirect_stdout(said) if options.get("json") else nullcontext():
                     codes.append(verb(path, **options) or 0)
                 reports.append(json.loads(said.getvalue() or "null"))
@@ -82,15 +91,38 @@ def _empty(folder: Path) -> FileError:
     return FileError(f"cannot read {folder}", why, "Name a folder with clips, or a clip.")
 
 
-def clips(paths: Iterable[Path]) -> Iterable[Path]:
-    """Files, and in place of folders the motion files in them, and in folders in these, without what verbs
-    have made of them. A folder without any stands for itself, to be complained of."""
+def _apart(found: list[tuple[Path, Path]]) -> None:
+    """RequestError where two results would have one name: the later would replace the earlier."""
+    of: dict[Path, Path] = {}
+    for path, place in found:
+        # Beside a clip lies its report, which has its name but for the suffix.
+        if (other := of.setdefault(place.with_suffix(""), path)) != path:
+            raise RequestError(
+                "two results would have one name",
+                f"{other} and {path} are both called {place.stem}",
+                "Do them one after the other, or name the folder that holds both folders.",
+            )
+
+
+def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[Path, Path]]:
+    """Files, and in place of folders the motion files in them, and in folders in these; each with where it
+    belongs in another folder.
+
+    Without what verbs have made of them, and what lies in the folder that results go to. A folder without any
+    stands for itself, to be complained of.
+    """
     for path in paths:
         if not path.is_dir():
-            yield path
+            yield path, Path(path.name)
             continue
         held = sorted(one for one in path.rglob("*") if one.suffix.lower() in MOTION and one.is_file())
-        # take.filled.bvh lies beside the take.bvh that it was made of.
-        names = {*held}
-        found = [one for one in held if one.with_name(one.stem.rpartition(".")[0] + one.suffix) not in names]
-        yield from found or [path]
+        names, into = {*held}, output.resolve() if output is not None else None
+        found = False
+        for one in held:
+            made = PRODUCT.fullmatch(one.stem)
+            of_other = made is not None and one.with_name(made[1] + one.suffix) in names
+            if not of_other and into not in one.resolve().parents:
+                found = True
+                yield one, one.relative_to(path)
+        if not found:
+            yield path, Path(path.name)

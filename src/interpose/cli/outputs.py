@@ -41,6 +41,10 @@ UNITS = {
 }
 
 
+# What verbs call what they make of take.bvh: take.filled.bvh and so on.
+MADE = ("between", "denoised", "filled", "forecast", "recovered", "stitched")
+
+
 @dataclass(frozen=True)
 class Outputs:
     """The files of one run, beside each other: clip, report and (if asked for) page."""

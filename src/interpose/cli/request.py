@@ -17,6 +17,7 @@ from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
 from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
+from interpose.observation.observation import frame_at
 from interpose.observation.scan import NO_GAPS, scan, to_gaps
 
 EASED = 0.4  # seconds over which joints of another clip are eased in and out
@@ -100,6 +101,10 @@ def from_options(
         if is_report(content) and any(map(content.get, ("place", "moments", "exchanged"))):
             why = f"{gaps} is of recover, which restored what is no gap"
             raise RequestError("this report cannot be repeated", why, "Run interpose recover again.")
+        if is_report(content) and content.get("frames", len(clip)) != len(clip):
+            why = f"it is of a clip of {content['frames']} frames, and {file} has {len(clip)}"
+            fix = f"Repeat it on {content.get('input', 'its own clip')}, or name the gaps with --gap."
+            raise RequestError(f"{gaps} does not fit", why, fix)
         filled = read_gaps(gaps)
         if is_report(content) and listed:
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
@@ -224,10 +229,13 @@ FRAME = r"\d+|\d*\.?\d+s"  # a frame, or a time in seconds
 
 def frame_of(text: str, clip: Clip) -> int:
     """A frame from "140", or the one nearest to "3.5s". RequestError for what is none, or is not there."""
-    if not re.fullmatch(FRAME, text):
+    try:
+        frame = frame_at(text, clip.fps) if re.fullmatch(FRAME, text) else None
+    except ValueError:  # hundreds of digits
+        frame = None
+    if frame is None:
         why = "it is a number of a frame, counted from 0, or a time in seconds"
         raise RequestError(f"cannot read the frame {text}", why, "Write 140, or 3.5s.")
-    frame = round(float(text[:-1]) * clip.fps) if text.endswith("s") else int(text)
     if frame >= len(clip):
         why = f"the clip has {len(clip)} frames, counted from 0"
         raise RequestError(f"there is no frame {text}", why, f"Choose one of 0 to {len(clip) - 1}.")

@@ -416,10 +416,10 @@ def run(
     for name in methods:
         registry.get(name)
     gaps = tuple(gaps) or rules.gaps
-    if bad := [gap for gap in gaps if not (3 if rules.keys_count else 1) <= gap <= 128]:
-        raise RequestError(
-            f"cannot measure a gap of {bad[0]} frames", "windows hold 3 to 128", "Choose others with --gaps."
-        )
+    least = 3 if rules.keys_count else 1
+    if bad := [gap for gap in gaps if not least <= gap <= 128]:
+        why = f"windows of this protocol hold {least} to 128"
+        raise RequestError(f"cannot measure a gap of {bad[0]} frames", why, "Choose others with --gaps.")
     held = load(data, split, lambda line: progress(0.0, line))
     result = Lafan1(held.name, split, rules)
     plain = dict.fromkeys(("zero-velocity", rules.base, "linear", "spline"))

@@ -23,12 +23,12 @@ from interpose.finish.solve import solve
 from interpose.finish.standing import steadied
 from interpose.finish.windows import ramp
 from interpose.geometry import rotations
-from interpose.geometry.time import runs
+from interpose.geometry.time import bending, runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
-from interpose.observation.tremor import FEWEST, bursts, deviation
+from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
 
@@ -79,9 +79,15 @@ def denoised(
         fill: completes a clip of which broken values are not observed.
 
     Raises:
-        RequestError: the range is too short.
+        RequestError: the range is too short, or the clip has too few frames a second.
     """
     stop = len(clip) if stop is None else stop
+    if clip.fps < SLOWEST:
+        raise RequestError(
+            f"a clip of {clip.fps:.4g} frames a second cannot be denoised",
+            "quick motion jumps from one frame to the next as noise does",
+            f"Take it as it was recorded, at {SLOWEST:g} frames a second or more.",
+        )
     if stop - start < FEWEST:
         raise RequestError(
             f"{stop - start} frame{'s' * (stop - start != 1)} cannot be denoised",
@@ -284,13 +290,6 @@ def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
 
 def _whittaker(signal: np.ndarray, stiff: float) -> np.ndarray:
     """The signal (F, d) nearest to this one whose squared second differences, times `stiff`, are small."""
-    count = len(signal)
-    bands = np.zeros((3, count))
-    for offset, weight in enumerate((1.0, -2.0, 1.0)):
-        bands[0, offset : count - 2 + offset] += weight**2
-    bands[1, :-1] = -2.0
-    bands[1, 1 : count - 2] -= 2.0
-    bands[2, : count - 2] = 1.0
-    bands *= stiff
+    bands = stiff * bending(len(signal))
     bands[0] += 1.0
     return np.asarray(solveh_banded(bands, signal, lower=True))

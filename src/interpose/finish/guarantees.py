@@ -406,6 +406,12 @@ def _sound(raw: Any, clip: Clip, name: str) -> None:
         problem = f"it gave {raw.clip.rotation.shape[:2]} frames and joints of {clip.rotation.shape[:2]}"
     elif raw.positions is not None and np.shape(raw.positions) != (len(clip), len(raw.joints), 3):
         problem = f"it gave positions {np.shape(raw.positions)} of {len(raw.joints)} joints"
+    elif raw.clip.translated != clip.translated:
+        problem = "it gave a clip in which other joints are translated"
+    elif raw.stands is not None and np.shape(raw.stands) != (len(clip), 4):
+        problem = f"it says of {np.shape(raw.stands)} feet that they stand, of ({len(clip)}, 4)"
+    elif raw.expected is not None and np.shape(raw.expected) != (len(clip),):
+        problem = f"it expects errors {np.shape(raw.expected)} of {len(clip)} frames"
     else:
         return
     raise RequestError(f"the method {name} does not work", problem, "Tell those who made it.")

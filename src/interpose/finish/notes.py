@@ -158,11 +158,12 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
 
 def liveliness(finished: Clip, gap: Gap) -> float | None:
     """`measures.liveliness` of a gap."""
-    second = round(finished.fps)
+    second, hips = round(finished.fps), hips_of(finished.skeleton)
     lo, hi = max(0, gap.start - second), min(len(finished), gap.stop + second)
-    return measures.liveliness(
-        finished.slice(lo, hi).positions(), gap.start - lo, gap.stop - lo, finished.fps
-    )
+    # Without roots above the hips, which may stay where they are.
+    body = np.flatnonzero(finished.skeleton.below[:, hips])
+    placed = finished.slice(lo, hi).positions()[:, body]
+    return measures.liveliness(placed, gap.start - lo, gap.stop - lo, finished.fps)
 
 
 def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) -> list[str]:

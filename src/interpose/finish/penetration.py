@@ -45,7 +45,7 @@ PAIRS = (
     ("left shin", "right thigh"),
 )
 LIMIT = 0.05  # metres: deeper is worth a word
-BESIDE = 60  # frames on both sides that are looked at as well
+BESIDE = 2.0  # seconds on both sides that are looked at as well
 
 
 def segment_distance(p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -89,7 +89,8 @@ def deepest(clip: Clip, start: int, stop: int, first: int = 0) -> tuple[float, s
     performers are stouter than others. It calls the first frame of the clip `first`. None for skeletons
     without such parts.
     """
-    lo, hi = max(0, start - BESIDE), min(len(clip), stop + BESIDE)
+    beside = round(BESIDE * clip.fps)
+    lo, hi = max(0, start - beside), min(len(clip), stop + beside)
     pairs, found = depths(clip.skeleton, clip.slice(lo, hi).positions())
     if not pairs:
         return None

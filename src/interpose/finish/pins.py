@@ -289,7 +289,9 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     """Turn a joint as a pin says, where its own rotation is free."""
     joint = clip.skeleton.index(pin.joint)
     turned, _ = clip.kinematics()
-    off = rotations.log(rotations.multiply(pin.orientation, rotations.conjugate(turned[pin.frames, joint])))
+    off = _unrolled(
+        rotations.log(rotations.multiply(pin.orientation, rotations.conjugate(turned[pin.frames, joint])))
+    )
     change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges, clip.fps))
     done, parent = rotations.multiply(change, turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
@@ -297,6 +299,17 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     rotation = clip.rotation.copy()
     rotation[:, joint] = np.where(known.rotation[:, joint, None], rotation[:, joint], done)
     return clip.with_motion(rotation, clip.translation)
+
+
+def _unrolled(turns: np.ndarray) -> np.ndarray:
+    """The same turns as rotation vectors (n, 3), each by as many whole turns more as bring it nearest to the
+    one before: past half a turn they would go all the way back."""
+    done = turns.copy()
+    for k in range(1, len(done)):
+        if angle := float(np.linalg.norm(turns[k])):
+            axis = turns[k] / angle
+            done[k] += 2 * np.pi * np.round((done[k - 1] @ axis - angle) / (2 * np.pi)) * axis
+    return done
 
 
 def _between(frames: int, at: np.ndarray, values: np.ndarray, edges: list[int], fps: float) -> np.ndarray:

@@ -15,6 +15,7 @@ from scipy.linalg import solveh_banded
 from interpose.clip import Clip, Skeleton
 from interpose.finish.windows import ramp
 from interpose.geometry import kinematics, rotations
+from interpose.geometry.time import bending
 from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_mapping
 
@@ -251,8 +252,7 @@ def refine_steadily(
     """
     freedom = Freedom.of(clip, observation, joints)
     frames, size = freedom.free.shape
-    bend = np.diff(np.eye(frames), 2, axis=0) if frames > 2 else np.zeros((0, frames))
-    even = steady * bend.T @ bend  # (F, F), of which nothing is further than two off the diagonal
+    even = steady * bending(frames)
     for _ in range(STEPS):
         normal, towards, frame = freedom.normal(clip, positions, weights)
         bands = np.zeros((2 * size + 1, frames * size))
@@ -260,10 +260,14 @@ def refine_steadily(
             for column in range(row + 1):
                 bands[row - column, column::size] = normal[:, row, column]
         bands[0] += DAMPING
-        for apart in range(min(3, frames)):
-            weight = np.diagonal(even, apart)[:, None] * freedom.free[apart:] * freedom.free[: frames - apart]
-            bands[apart * size, : (frames - apart) * size] += weight.ravel()
-        towards = towards[..., 0] - even @ done * freedom.free
+        towards = towards[..., 0] - even[0][:, None] * done * freedom.free
+        bands[0] += (even[0][:, None] * freedom.free**2).ravel()
+        for apart in range(1, min(3, frames)):
+            weight = even[apart, : frames - apart, None]
+            both = freedom.free[apart:] * freedom.free[: frames - apart]
+            bands[apart * size, : (frames - apart) * size] += (weight * both).ravel()
+            towards[apart:] -= weight * done[: frames - apart] * freedom.free[apart:]
+            towards[: frames - apart] -= weight * done[apart:] * freedom.free[: frames - apart]
         step = solveh_banded(bands, towards.ravel(), lower=True).reshape(frames, size) * freedom.free
         clip, done = freedom.moved(clip, step, frame), done + step
     return clip, done
@@ -277,6 +281,8 @@ class Freedom:
         known: the n joints.
         movable, carriers: the joints that may turn, and those that may shift.
         free: (F, d) 1 where they may, three columns for each.
+        above: (n, movable) 1 where the known joint hangs below the one that may turn.
+        by_shift: (3 n, 3 carriers) how much a shift of each carrier along each axis moves each known joint.
     """
 
     known: list[int]
@@ -290,12 +296,12 @@ class Freedom:
     def of(cls, clip: Clip, observation: Observation, joints: tuple[int, ...]) -> Freedom:
         """Of what is not observed."""
         skeleton, known = clip.skeleton, list(joints)
-        under = _under(skeleton)
+        under = (skeleton.below & ~np.eye(len(skeleton), dtype=bool)).astype(float)
         movable = [j for j in sorted(joints) if under[known, j].any()]
         carriers = list(_carriers(skeleton, clip.translated, set(joints)))
         seen = [observation.rotation[:, movable], observation.translation[:, carriers]]
         free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
-        carried = (under + np.eye(len(skeleton)))[np.ix_(known, carriers)]
+        carried = skeleton.below[np.ix_(known, carriers)]
         by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
         return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift)
 
@@ -338,16 +344,6 @@ class Freedom:
         shift = to_parent(step[:, turns:].reshape(frames, -1, 3), self.carriers)
         translation[:, slots] += shift / skeleton.scale_above[self.carriers][:, None]
         return clip.with_motion(rotation, translation)
-
-
-def _under(skeleton: Skeleton) -> np.ndarray:
-    """(J, J) 1 where the row's joint hangs below the column's."""
-    under = np.zeros((len(skeleton), len(skeleton)))
-    for joint, parent in enumerate(skeleton.parents):
-        if parent >= 0:
-            under[joint] = under[parent]
-            under[joint, parent] = 1.0
-    return under
 
 
 def solve_error(clip: Clip, joints: tuple[int, ...], positions: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from scipy.linalg import solveh_banded
 
 from interpose.clip import Clip
 from interpose.finish import feet
+from interpose.geometry.time import bending
 from interpose.observation import Observation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, moved
@@ -194,16 +195,13 @@ def _carried(
     right[1:] += step
     # Weights are those of 30 frames a second; a step is as much shorter as there are more, and what changes
     # from one to the next as much more so.
-    second, often = (1.0, -2.0, 1.0), fps / 30
+    often = fps / 30
     goes_on, on_floor = GOES_ON * often**2, FLOOR / often**2
     air = np.logical_not(stands.any(axis=1))
     down = np.where(air[1:] & air[:-1], -grown * GRAVITY / fps**2, 0.0)
-    for i, weight in enumerate(second):
-        bands[0, i : count - 2 + i] += goes_on * weight**2
+    bands += goes_on * bending(count)
+    for i, weight in enumerate((1.0, -2.0, 1.0)):
         right[i : count - 2 + i, 1] += goes_on * weight * down
-    bands[1, : count - 2] -= 2 * goes_on
-    bands[1, 1 : count - 1] -= 2 * goes_on
-    bands[2, : count - 2] += goes_on
     path = np.asarray(solveh_banded(bands, right, lower=True))
     if floor is None:
         return path

@@ -47,8 +47,6 @@ ROW, ROWS = Constant(np.arange(16) // 4), Constant(np.tile(np.eye(4), (4, 1)))
 def identity(*shape: int, like: Array = None) -> Array:
     """The identity quaternion in an array of shape (*shape, 4), of the kind and precision of `like`."""
     if like is None:
-        import numpy as np
-
         like = np.zeros(())
     xp = array_namespace(like)
     one = xp.zeros((*shape, 4), dtype=like.dtype, device=like.device if hasattr(like, "device") else None)

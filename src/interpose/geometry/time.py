@@ -264,3 +264,15 @@ def _due(kept: np.ndarray, first: int, last: int) -> np.ndarray:
     if stop - start == len(kept):
         line = line + late[0]  # the first frame stays the first
     return np.concatenate([kept[:start], line[start:stop], kept[stop:]])
+
+
+def bending(frames: int) -> np.ndarray:
+    """(3, frames) how second differences of a signal add up, squared: the lower bands of that matrix.
+
+    What `scipy.linalg.solveh_banded` takes, the diagonal first (Whittaker 1923; Eilers 2003).
+    """
+    bands = np.zeros((3, frames))
+    for first, one in enumerate((1.0, -2.0, 1.0)):
+        for apart, other in enumerate((1.0, -2.0, 1.0)[first:]):
+            bands[apart, first : max(frames - 2 + first, first)] += one * other
+    return bands

@@ -103,7 +103,7 @@ class Base:
             known[before] & known[after],
             (label, mirrored(card.labels)[label] if label else 0),
             bones,
-            *pinned(observation, body.mapping, times, body.scale),
+            *pinned(observation, body.mapping, times, body.scale * body.hand),
         )
         answer = run_long(card, seen)
         said = kinematics.global_rotations(answer.local, PARENTS)
@@ -173,12 +173,13 @@ def knowledge(observation: Observation, mapping: Mapping) -> np.ndarray:
 
 
 def pinned(
-    observation: Observation, mapping: Mapping, times: np.ndarray, scale: float
+    observation: Observation, mapping: Mapping, times: np.ndarray, scale: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where pins say that canonical joints are (T, 22, 3), in metres of the scaled body, and of which (T, 22)
     they do.
 
     times: of the network's frames (T), in frames of the clip; a pin speaks of the nearest one.
+    scale: (3,) of the body to the canonical one, along each axis: negative where that is its mirror image's.
     """
     rows = {joint: row for row, joint in zip(*mapping.mapped)}
     places, said = np.zeros((len(times), len(PARENTS), 3)), np.zeros((len(times), len(PARENTS)), bool)

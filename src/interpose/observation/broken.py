@@ -108,10 +108,7 @@ def roughness(lost: np.ndarray, *clips: Clip) -> Iterator[tuple[int, int, list[n
         np.pad(np.linalg.norm(np.diff(one.positions(), 2, axis=0), axis=-1), ((1, 1), (0, 0)))
         for one in clips
     ]
-    below = np.eye(lost.shape[1], dtype=bool)
-    for joint, parent in enumerate(clips[0].skeleton.parents):
-        if parent >= 0:
-            below[joint] |= below[parent]
+    below = clips[0].skeleton.below
     for start, stop in runs(np.asarray(lost.any(axis=1))):
         joints = below[:, lost[start:stop].any(axis=0)].any(axis=1)
         yield start, stop, [some[max(start - 1, 0) : stop + 1][:, joints].max(axis=0) for some in jumps]
@@ -258,9 +255,7 @@ def _real(clip: Clip, lost: np.ndarray, spikes: np.ndarray, usual: np.ndarray) -
     cured = clip.with_motion(np.where(spikes[..., None], usual, base.rotation), clip.translation)
     before, after = base.positions(), cured.positions()
     middle = medians(after, AROUND, "edge")
-    below = np.array(
-        [[j in clip.skeleton.ancestors(k) for j in range(len(lost[0]))] for k in range(len(lost[0]))]
-    )
+    below = clip.skeleton.below & ~np.eye(len(clip.skeleton), dtype=bool)
     nearer = _apart(before, middle) - _apart(after, middle)
     return np.asarray((nearer - NEARER * np.maximum(_apart(before, after) - SLIGHT, 0.0)) @ below >= -SAME)
 

@@ -36,6 +36,9 @@ class Gap:
     def __post_init__(self) -> None:
         for side in ("start", "stop"):
             object.__setattr__(self, side, frame_number(getattr(self, side)))
+        if self.joints is not None:
+            joints = (self.joints,) if isinstance(self.joints, str) else tuple(self.joints)
+            object.__setattr__(self, "joints", joints)
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -51,18 +54,13 @@ class Gap:
         """
         first, colon, last = text.strip().partition(":")
 
-        def frame(said: str, end: int) -> int:
-            if clip is None or not (said == "" or said.endswith("s")):
-                return int(said)
-            seconds = float(said[:-1]) if said else 0.0
-            if not math.isfinite(seconds):
-                raise ValueError
-            return round(seconds * clip.fps) if said else end
-
         try:
             if not colon or (clip is not None and not first + last):
                 raise ValueError
-            return cls(frame(first, 0), frame(last, 0 if clip is None else len(clip)), joints)
+            if clip is None:
+                return cls(int(first), int(last), joints)
+            start = frame_at(first, clip.fps) if first else 0
+            return cls(start, frame_at(last, clip.fps) if last else len(clip), joints)
         except ValueError:
             raise RequestError(
                 f"cannot read the gap {text!r}",
@@ -82,7 +80,17 @@ class Gap:
         return self
 
 
-@dataclass(frozen=True)
+def frame_at(text: str, fps: float) -> int:
+    """The frame that is named "140", or the one nearest to "3.5s". ValueError for anything else."""
+    if not text.endswith("s"):
+        return int(text)
+    frame = float(text[:-1]) * fps
+    if not math.isfinite(frame):
+        raise ValueError
+    return round(frame)
+
+
+@dataclass(frozen=True, eq=False)
 class Pin:
     """A known *global* position and/or orientation of a joint at some frames.
 

@@ -81,7 +81,7 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       BVH files of the CMU library.
     - "frozen": joints whose local rotation stops changing altogether while it moves elsewhere in the clip,
       for at least .1 s (and 3 frames) with a jump at one end; or for a second in which the joint would
-      usually have turned 10 degrees, away from the rest pose: a hinge at its limit has no jump, and files
+      usually have turned 11 degrees, away from the rest pose: a hinge at its limit has no jump, and files
       write it as their rest pose. When everything that moves stands still at once, the root's position
       included, it is one finding of the whole pose; of all joints that turn, when the position goes on.
       A limb, or its end, that hardly moves for .3 s (a joint alone for .6 s) and then is elsewhere from one

@@ -13,6 +13,9 @@ from interpose.geometry.time import runs
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 GAIN = float(np.linalg.norm(DIFFERENCE))
 FEWEST = 8  # frames: less motion cannot be told from noise
+# Frames a second: with fewer, what is quick jumps from one to the next as noise does. Clean clips at 24 are
+# moved by .4 cm at most, some at 20 by 24 cm.
+SLOWEST = 23.0
 # Metres by which joints tremble, in the mean, in frames that are noisy by themselves: the median within so
 # many seconds. Of 142 clips of all data sets one trembles by as much, in fits. A clip of which more is noisy
 # is so all along, and the median of all of it tells its noise.
@@ -34,10 +37,13 @@ def trembling(values: np.ndarray) -> np.ndarray:
 
 
 def bursts(clip: Clip) -> list[tuple[int, int]]:
-    """The frames start to stop - 1 of a clip that are noisy, where others are not: what trembles in all of it
-    does not tell of them. None in a clip that is noisy for the most part, and in a short one."""
+    """The frames start to stop - 1 of a clip that are noisy, where others are not.
+
+    What trembles in all of it does not tell of them: there are none in a clip that is noisy for the most
+    part, in a short one, and in one of too few frames a second.
+    """
     window = max(FEWEST, round(WINDOW * clip.fps)) | 1
-    if len(clip) < 2 * window:
+    if len(clip) < 2 * window or clip.fps < SLOWEST:
         return []
     local = ndimage.median_filter(trembling(clip.positions()).mean(axis=1), size=window, mode="nearest")
     half = (len(clip) - len(local)) // 2

@@ -174,5 +174,8 @@ def put_together(clip: Clip, said: list[tuple[int, slice, Raw]]) -> Raw:
 
 def raw_part(raw: Raw, start: int, stop: int) -> Raw:
     """What a method said of the frames start to stop - 1."""
-    positions, own = (None if some is None else some[start:stop] for some in (raw.positions, raw.own))
-    return replace(raw, clip=raw.clip.slice(start, stop), positions=positions, own=own)
+    by_frame = {name: getattr(raw, name) for name in ("positions", "own", "stands", "expected")}
+    parts: dict[str, Any] = {
+        name: None if some is None else some[start:stop] for name, some in by_frame.items()
+    }
+    return replace(raw, clip=raw.clip.slice(start, stop), **parts)
