@@ -38,7 +38,7 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
     for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
         name = str(path.relative_to(folder))
         if path.with_suffix(".json").exists():
-            progress(f"left out: {name} (interpose made it: its report lies beside it)")
+            progress(f"left out: {name} (a .json lies beside it, as beside what interpose makes)")
             continue
         try:
             clip = resample(load(path), FPS)

@@ -13,7 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import feet, floor, jumps, measures, notes, penetration, pins, seams
+from interpose.finish import anatomy, feet, floor, jumps, measures, notes, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance, Report
@@ -119,6 +119,7 @@ def complete(
         for span in spans:
             if lost[span.start : span.stop].any():
                 span.notes.append((span.start, span.stop - 1, STOOD))
+        opinion = anatomy.straightened(opinion, known)
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
@@ -131,6 +132,8 @@ def complete(
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
             _fade(current, source, hidden, known, span)
+            if not (isinstance(method, Layer) and method.pins):
+                anatomy.calm(current, known, span)
             places = jumps.mend(current, known, span, bounds)
             if source is opinion:
                 mended[span.start] = places
@@ -145,6 +148,7 @@ def complete(
 
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
+        span.problem = span.problem or anatomy.inside_out(opinion, known, span)
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
@@ -600,6 +604,7 @@ def _report(
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),
             *notes.hasty(finished, known, gap, first),
+            *notes.whirling(finished, known, gap, first),
             *([] if bounds else notes.wild(finished, known, gap, first)),
             *notes.doubtful(risk, gap, first, ahead),
             *(notes.scant(known, gap, finished.fps) if networks else ()),

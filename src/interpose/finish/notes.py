@@ -8,7 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
-from interpose.finish import feet, floor, measures, seams
+from interpose.finish import anatomy, feet, floor, measures, seams
 from interpose.finish.windows import grow
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -38,6 +38,8 @@ BESIDE = 0.1
 BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 1.4, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
+# Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
+ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
 # Metres a second squared by which velocities jump where feet land and hands strike, and seldom else.
 WILD = 100.0
@@ -156,6 +158,36 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     return []
 
 
+def whirling(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """A note where a joint turns faster than any does, or the body goes round once more than the poses beside
+    a gap say."""
+    near = round(feet.NEARBY * finished.fps)
+    lo, hi = max(0, gap.start - near), min(gap.stop + near, len(finished))
+    part, seen = finished.slice(lo, hi), known.slice(lo, hi)
+    if found := anatomy.whirl(part, seen, gap.start - lo, gap.stop - lo):
+        name = finished.skeleton.names[found.joint]
+        usual = f", around the gap by {found.usual:.0f} at most" if found.usual else ""
+        return [
+            f"flagged: {name} turns by {found.rate:.0f} degrees a second at frame "
+            f"{first + lo + found.frame}{usual}: more frames, or a key there, help"
+        ]
+    ends = gap.start - 1 - lo, gap.stop - lo
+    if gap.joints is not None or ends[0] < 0 or ends[1] >= len(part):
+        return []
+    turned = np.degrees(anatomy.turning(part))
+    way = float(turned[ends[1]] - turned[ends[0]])
+    short = (way + 180) % 360 - 180
+    # Half a turn is as far to the one side as to the other.
+    if abs(way - short) < 180 or abs(abs(way) - abs(short)) < ROUND:
+        return []
+    said = f"flagged: it turns by {abs(way):.0f} degrees to the {'left' if way > 0 else 'right'}"
+    other = "" if way * short > 0 else " the other way"
+    return [
+        f"{said}, where the poses beside the gap are {abs(short):.0f} apart{other}: a key in between says "
+        "which is meant"
+    ]
+
+
 def liveliness(finished: Clip, gap: Gap) -> float | None:
     """`measures.liveliness` of a gap."""
     second, hips = round(finished.fps), hips_of(finished.skeleton)
@@ -189,9 +221,7 @@ def doubtful(risk: np.ndarray | None, gap: Gap, first: int, ahead: bool) -> list
     off = f"{100 * risk.mean():.0f} cm"
     said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
     # Whoever asks for what comes next has no key to give.
-    return [
-        said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps most"
-    ]
+    return [said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps"]
 
 
 def never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:

@@ -90,3 +90,13 @@ def choose_told(clip: Clip, gap: Gap, turns: float, action: str) -> Method:
     if not methods:
         raise said
     return next((method for method in methods if method.refuses(clip, gap) is None), methods[0])
+
+
+def instead(chosen: Method, clip: Clip, gap: Gap) -> Method:
+    """What takes over where a method's motion is none of a person's: the spline, and for `cmib`, whose gaps
+    are long, between keys, and half a turn wide, `small`."""
+    try:
+        other = registry.get(KEYS[0]) if chosen.name == KEYS[1] and weights.find(KEYS[0]) else None
+    except RequestError:
+        other = None
+    return other if other is not None and other.refuses(clip, gap) is None else registry.get("spline")

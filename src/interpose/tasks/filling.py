@@ -14,6 +14,7 @@ from interpose.finish import Completion, GapReport, Provenance, Report, complete
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
 from interpose.geometry.time import resample
+from interpose.methods import auto
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.observation import frame_number
@@ -126,7 +127,8 @@ def fill(
         way = {f - lo: point for f, point in path.items() if f in led}
         # The file tells what its joints can do, and is not what the window is written to.
         window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
-        part = complete(window, seen, chosen, seed, limit=limit, path=way, first=lo - zero)
+        other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
+        part = complete(window, seen, chosen, seed, other, limit=limit, path=way, first=lo - zero)
         for job, start, stop in pieces:
             fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
             inside = slice(start - lo, stop - lo)

@@ -1,0 +1,94 @@
+"""What no body does is mended, or said: a walk, and methods that say something else of single joints."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.finish import anatomy, complete
+from interpose.geometry import rotations
+from interpose.methods.classical import Linear, Spline
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+from interpose.skeletons import find_humanoid
+from interpose.skeletons.humanoid import reflect
+
+GAP = Gap(70, 110)
+INSIDE = slice(GAP.start, GAP.stop)
+
+
+class Turning:
+    """A spline, but for one joint that turns by so many degrees about an axis, frame by frame of the gap."""
+
+    name = "turning"
+
+    def __init__(self, joint: str, axis: str, degrees: np.ndarray) -> None:
+        self.joint, self.turn = joint, rotations.about(axis, np.radians(degrees))
+
+    def refuses(self, clip, gap):
+        return None
+
+    def complete(self, clip, observation, seed=None):
+        done = Spline().complete(clip, observation).clip
+        body = find_humanoid(done)
+        rotation, joint = done.rotation.copy(), done.skeleton.index(self.joint)
+        # About an axis of the T-pose of the whole body.
+        rest = body.rest.rotation[body.mapping.joints.index(joint)]
+        own = rotations.multiply(rotations.conjugate(rest), rotations.multiply(self.turn, rest))
+        rotation[INSIDE, joint] = rotations.multiply(rotation[INSIDE, joint], own)
+        return Raw(done.with_motion(rotation, done.translation))
+
+
+def filled(clip, method, **options):
+    return complete(clip, Observation.from_gaps(clip, [GAP]), method, **options)
+
+
+def hill(height):
+    """From nothing to so many degrees, and back."""
+    return height * np.sin(np.linspace(0, np.pi, len(GAP)))
+
+
+def test_a_motion_with_a_knee_inside_out_is_not_taken(cmu_walk):
+    done = filled(cmu_walk, Turning("LeftLeg", "Y", hill(170)))
+    assert done.report.gaps[0].method == "spline"
+    assert "filled by spline instead: a knee turns inside out" in done.report.gaps[0].notes[0]
+    assert filled(cmu_walk, Turning("LeftLeg", "Y", hill(40))).report.gaps[0].method == "turning"
+    other = filled(cmu_walk, Turning("LeftLeg", "Y", hill(170)), fallback=Linear())
+    assert other.report.gaps[0].method == "linear"
+
+
+@pytest.mark.parametrize("make", [lambda clip: clip, reflect])
+def test_knees_do_not_bend_forwards(cmu_walk, make):
+    clip = make(cmu_walk)
+    method = Turning("LeftLeg", "X", -hill(100))
+    raw = method.complete(clip, Observation.from_gaps(clip, [GAP])).clip
+    done = filled(clip, method)
+
+    def bend(some):
+        return anatomy.knees(find_humanoid(clip).rotations(some))[1][INSIDE, 0].min()
+
+    assert bend(raw) < -20
+    assert bend(done.clip) > -5
+    assert done.report.gaps[0].method == "turning"
+
+
+def test_a_joint_that_whirls_goes_the_short_way(cmu_walk):
+    degrees = 360.0 * np.clip((np.arange(len(GAP)) - 18) / 4, 0, 1)
+    done = filled(cmu_walk, Turning("RightHand", "Y", degrees))
+    joint = done.clip.skeleton.index("RightHand")
+    turned = done.clip.rotation[:, joint]
+    rate = np.degrees(rotations.angle(turned[1:], turned[:-1])) * cmu_walk.fps
+    assert rate[GAP.start - 1 : GAP.stop].max() < 1500
+    assert not [note for note in done.report.gaps[0].notes if "degrees a second" in note]
+    others = np.arange(len(cmu_walk.skeleton)) != joint
+    plain = filled(cmu_walk, Spline()).clip
+    np.testing.assert_allclose(done.clip.rotation[:, others], plain.rotation[:, others], atol=1e-6)
+
+
+def test_a_body_that_spins_is_said_to(cmu_walk):
+    """It is not mended: which way it is to go only another key tells."""
+    done = filled(cmu_walk, Turning("Hips", "Y", 360.0 * np.clip((np.arange(len(GAP)) - 10) / 20, 0, 1)))
+    assert [note for note in done.report.gaps[0].notes if "Hips turns by" in note]
+    done = filled(cmu_walk, Turning("Hips", "Y", np.linspace(0, 360, len(GAP))))
+    assert [note for note in done.report.gaps[0].notes if "which is meant" in note]
+    assert not [note for note in filled(cmu_walk, Spline()).report.gaps[0].notes if "turn" in note]
