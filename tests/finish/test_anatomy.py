@@ -92,3 +92,17 @@ def test_a_body_that_spins_is_said_to(cmu_walk):
     done = filled(cmu_walk, Turning("Hips", "Y", np.linspace(0, 360, len(GAP))))
     assert [note for note in done.report.gaps[0].notes if "which is meant" in note]
     assert not [note for note in filled(cmu_walk, Spline()).report.gaps[0].notes if "turn" in note]
+
+
+def test_joints_that_never_turn_stay_as_they_are(cmu_walk):
+    """Toes of some rigs, and what hangs between hips and thighs."""
+    rotation = cmu_walk.rotation.copy()
+    toe, shoulder = (cmu_walk.skeleton.index(name) for name in ("LeftToeBase", "LeftShoulder"))
+    rotation[:, [toe, shoulder]] = rotation[0, [toe, shoulder]]
+    clip = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    done = filled(clip, Turning("LeftToeBase", "X", hill(40)))
+    np.testing.assert_allclose(
+        done.clip.rotation[:, [toe, shoulder]], rotation[:, [toe, shoulder]], atol=1e-6
+    )
+    moves = filled(cmu_walk, Turning("LeftToeBase", "X", hill(40))).clip.rotation[INSIDE, toe]
+    assert np.abs(moves - rotation[INSIDE, toe]).max() > 0.1

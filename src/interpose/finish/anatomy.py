@@ -7,7 +7,7 @@ other some let a shin turn round its own axis, or take a wrist the long way roun
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -32,6 +32,9 @@ WHIRLS, SPINS, OWN = 1500.0, 450.0, 1.5
 # Seconds on either side of a whirl that a spline takes over, as few as do.
 MENDS = (0.1, 0.2, 0.4, 0.8)
 ROUNDS = 20  # whirls that are looked after
+# What quaternions of a joint that does not turn differ by, and the share of joints that do not beyond which
+# the whole body stands still.
+LOCKED, MOVING = 1e-6, 0.5
 LEGS = [(JOINTS.index(side + "UpLeg"), JOINTS.index(side + "Leg")) for side in ("Left", "Right")]
 DOWN, UP = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
@@ -94,6 +97,18 @@ def straightened(opinion: Clip, known: Observation) -> Clip:
     return opinion.with_motion(
         np.where(known.rotation[..., None], opinion.rotation, done.rotation), opinion.translation
     )
+
+
+def locked(clip: Clip, known: Observation) -> Observation:
+    """What is known, and that joints stay as they are that never turn where they are seen, while others do.
+
+    Toes of some rigs have never been captured, and a hinge has axes that its rig locks.
+    """
+    still = np.zeros(len(clip.skeleton), bool)
+    for joint in np.flatnonzero(known.rotation.sum(axis=0) >= clip.fps):
+        seen = clip.rotation[known.rotation[:, joint], joint]
+        still[joint] = (np.abs(seen - seen[0]) < LOCKED).all()
+    return replace(known, rotation=known.rotation | still) if still.mean() <= MOVING else known
 
 
 @dataclass(frozen=True)

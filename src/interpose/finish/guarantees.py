@@ -113,6 +113,7 @@ def complete(
         raw = _said(method, hidden, observation, seed)
 
     opinion, error = _opinion(raw, known, spans)
+    firm = known  # and joints that never turn
     if not isinstance(method, Layer):
         opinion = _carried(opinion, hidden, known)
         lost = alone(known, hidden)
@@ -120,6 +121,9 @@ def complete(
             if lost[span.start : span.stop].any():
                 span.notes.append((span.start, span.stop - 1, STOOD))
         opinion = anatomy.straightened(opinion, known)
+        if raw.positions is None:
+            firm = anatomy.locked(hidden, known)
+            opinion = _merge(opinion, hidden, firm)
     opinion = held(opinion, clip.source)
     current = _merge(opinion, hidden, known)
     limit = seams.limit(hidden, known) if limit is None else limit
@@ -131,20 +135,20 @@ def complete(
     def settle(chosen: list[Span], source: Clip) -> None:
         # All spans take each step together: two that share a lone key are neighbours at every step.
         for span in chosen:
-            _fade(current, source, hidden, known, span)
+            _fade(current, source, hidden, firm, span)
             if not (isinstance(method, Layer) and method.pins):
-                anatomy.calm(current, known, span)
-            places = jumps.mend(current, known, span, bounds)
+                anatomy.calm(current, firm, span)
+            places = jumps.mend(current, firm, span, bounds)
             if source is opinion:
                 mended[span.start] = places
         for span in chosen:
             unheld.update(_slides(current, known, span, gaps))
             if source is not opinion or not (isinstance(method, Layer) and method.stands):
-                _plant(current, known, span, bounds, raw.stands if source is opinion else None)
-                _lift(current, known, span)
+                _plant(current, firm, span, bounds, raw.stands if source is opinion else None)
+                _lift(current, firm, span)
         for _ in range(ROUNDS):
             for span in chosen:
-                jumps.soften(current, known, span, limit)
+                jumps.soften(current, firm, span, limit)
 
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
@@ -603,6 +607,7 @@ def _report(
             *notes.sunk(finished, known, gap, first),
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),
+            *notes.skids(held[0] if held else None, finished, known, gap),
             *notes.hasty(finished, known, gap, first),
             *notes.whirling(finished, known, gap, first),
             *([] if bounds else notes.wild(finished, known, gap, first)),
