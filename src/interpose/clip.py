@@ -128,7 +128,7 @@ class Skeleton:
 
 # Frames a second: who has fewer gives a frame time for a rate, and nothing has more. How far the square of a
 # quaternion's length may be from 1: what is stored with three decimals is nearer, and is made 1 if it is not.
-SLOWEST, FASTEST, UNIT, ROUNDED = 0.1, 1e5, 0.01, 1e-6
+SLOWEST, FASTEST, UNIT, ROUNDED = 0.25, 1e5, 0.01, 1e-6
 
 
 @dataclass(frozen=True, eq=False)

@@ -36,6 +36,12 @@ class NothingError(RequestError):
         self.left, self.code = left, code
 
 
+class Fault(InterposeError):
+    """The program is wrong."""
+
+    exit_code = 1
+
+
 class FileError(InterposeError):
     """The input cannot be read: missing, binary, truncated or contradicting itself."""
 

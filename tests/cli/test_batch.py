@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from interpose.formats import load, save
+from interpose.methods.classical import ZeroVelocity
 
 
 @pytest.fixture
@@ -119,3 +120,37 @@ def test_a_take_with_a_dot_in_its_name_is_a_take(run, takes):
     (takes / "c.bvh").rename(takes / "b.take2.bvh")
     done = run("scan", "takes", "--json")
     assert [one["input"] for one in done.json] == ["takes/a.bvh", "takes/b.bvh", "takes/b.take2.bvh"]
+
+
+def test_what_nobody_foresaw_of_one_clip_keeps_nobody_from_the_others(run, takes, monkeypatch):
+    """A method of somebody else that fails, and a folder that cannot be made."""
+    (takes / "c.bvh").unlink()
+    monkeypatch.setattr(ZeroVelocity, "complete", lambda *_: 1 / 0)
+    done = run("fill", "takes", "--gap", "60:80", "--method", "zero-velocity", "--json")
+    assert done.code == 2
+    assert [one["input"] for one in done.json] == ["takes/a.bvh", "takes/b.bvh"]
+    assert "the method zero-velocity does not work" in done.json[0]["error"]
+    assert "ZeroDivisionError" in done.json[0]["why"]
+    (takes.parent / "file").write_text("no folder")
+    done = run("fill", "takes", "--gap", "60:80", "--method", "spline", "-o", "file/sub", "--json")
+    assert [one["code"] for one in done.json] == [3, 3]
+    assert len(done.err.splitlines()) == 7
+
+
+def test_what_could_not_be_done_counts_before_what_was_left_open(run, takes):
+    done = run("fill", "takes/b.bvh", "takes/c.bvh", "--gap", "60:80", "--method", "spline", "--max-gap", "9")
+    assert done.code == 3
+
+
+def test_reports_of_two_formats_of_a_take_do_not_meet(run, takes):
+    save(load(takes / "b.bvh"), takes / "b.npz")
+    done = run("fill", "takes/b.bvh", "takes/b.npz", "--gap", "60:80", "--method", "spline")
+    assert done.code == 2
+    assert "two results would have one name" in done.err
+    assert run("scan", "takes/b.bvh", "takes/b.npz").code == 0
+
+
+def test_one_clip_goes_into_a_folder_too(run, takes):
+    (takes / "done").mkdir()
+    assert run("fill", "takes/b.bvh", "--gap", "60:80", "--method", "spline", "-o", "takes/done").code == 0
+    assert (takes / "done" / "b.bvh").exists()

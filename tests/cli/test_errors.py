@@ -37,7 +37,7 @@ def three_lines(err: str) -> list[str]:
         (["--gap", "60:80", "--method", "splin"], "spline"),
         (["--gap", "60:80", "--method", "foo"], "auto, "),
         (["--gap", "60:80", "--max-gap", "0"], "--max-gap"),
-        (["--gap", "60:80", "--max-gap", "many"], "whole number"),
+        (["--gap", "60:80", "--max-gap", "many"], "a number of frames"),
         (["--gap", "60:80", "--only-gap", "7"], "7"),
         (["--gap", "60:80", "-o", "out.fbx"], ".bvh"),
         (["--gap", "60:80", "-o", "no/such/out.bvh"], "no/such"),

@@ -188,7 +188,7 @@ def test_only_one_gap(run, take):
 
 def test_a_dry_run_writes_nothing(run, take):
     done = run(
-        "fill", "take.bvh", "--gap", "20:30", "--gap", "60:120", "--max-gap", "40", "--dry-run", "--player"
+        "fill", "take.bvh", "--gap", "20:30", "--gap", "60:120", "--max-gap", "1.34s", "--dry-run", "--player"
     )
     assert done.code == 4
     assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
@@ -561,3 +561,13 @@ def test_a_report_of_a_clip_of_other_frames_is_refused(run, take):
     done = run("fill", "take.bvh", "--gaps", "take.between.json")
     assert done.code == 2
     assert "it is of a clip of 22 frames" in done.err
+
+
+def test_whose_weights_they_are_is_said(run, take):
+    done = run("fill", "take.bvh", "--gap", "60:90", "--method", "small")
+    assert "small: for research and non-commercial use" in done.out
+    report = json.loads(take.with_name("take.filled.json").read_text())
+    assert [one["name"] for one in report["weights"]] == ["small"]
+    assert "research" in report["weights"][0]["licence"]
+    done = run("fill", "take.bvh", "--gap", "60:90", "--method", "small-open", "--force")
+    assert "non-commercial" not in done.out

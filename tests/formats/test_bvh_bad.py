@@ -99,6 +99,7 @@ def test_paths(tmp_path, good):
         ("Time: 0.0333333", "Time: 0", "frame time is 0"),
         ("Time: 0.0333333", "Time: -0.1", "frame time is -0.1"),
         ("Time: 0.0333333", "Time: nan", "frame time is nan"),
+        ("Time: 0.0333333", "Time: 8.33333", "a frame takes 8.33333 seconds"),
         ("Time: 0.0333333", "Time: 1e-320", "frame time is"),
         ("Frame Time: 0.0333333", "", "no frame time"),
     ],

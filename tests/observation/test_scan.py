@@ -316,3 +316,13 @@ def test_what_jumps_is_what_turns(cmu_walk):
     rotation[100:, arm] = rotations.multiply(rotation[100:, arm], rotations.about("y", np.array(0.9)))
     found = [one for one in scan(cmu_walk.with_motion(rotation, cmu_walk.translation)) if one.kind == "jump"]
     assert [(one.joints, one.start) for one in found] == [(("LeftArm",), 100)]
+
+
+def test_a_clip_in_which_nothing_ever_moves_is_said(cmu_walk):
+    """A stream that was dead from the beginning: nothing tells what is missing, but it is no motion."""
+    dead = np.repeat(cmu_walk.rotation[50:51], len(cmu_walk), axis=0)
+    for way in (cmu_walk.translation, np.repeat(cmu_walk.translation[:1], len(cmu_walk), axis=0)):
+        found = [one for one in scan(cmu_walk.with_motion(dead, way)) if one.kind == "still"]
+        assert [(one.joints, one.start, one.stop) for one in found] == [(None, 0, len(cmu_walk))]
+        assert "no joint turns" in found[0].note
+        assert not to_gaps(found)

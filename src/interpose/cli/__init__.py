@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Sequence
 
 from interpose import __version__
-from interpose.errors import InterposeError
+from interpose.errors import Fault, FileError, InterposeError
 
 # Before NumPy is imported: its matrices are small here, and threads that wait for cores that others use make
 # a fill many times as long.
@@ -95,11 +95,23 @@ def main(tokens: Sequence[str] | None = None) -> int:
     except Exception as error:
         if debug:
             traceback.print_exc()
-        kind = type(error).__name__
-        why = f"a {kind} that it should have foreseen"
-        fix = "Run it again with --debug and report what that prints."
-        _complain(InterposeError(f"interpose failed: {error or kind}", why, fix))
-        return 1
+        told = foreseen(error)
+        _complain(told)
+        return told.exit_code
+
+
+def foreseen(error: Exception) -> InterposeError:
+    """What the machine refuses, or a fault of this program, in the words of all other errors."""
+    if isinstance(error, InterposeError):
+        return error
+    kind = type(error).__name__
+    if isinstance(error, OSError) and error.strerror:
+        what = f"cannot use {error.filename}" if error.filename else "cannot read or write"
+        fix = "Check the path, what you may do there, and whether there is room."
+        return FileError(what, error.strerror, fix)
+    why = f"a {kind} that it should have foreseen"
+    fix = "Run it again with --debug and report what that prints."
+    return Fault(f"interpose failed: {error or kind}", why, fix)
 
 
 def _run(tokens: list[str], debug: bool) -> int:

@@ -12,9 +12,10 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from interpose.cli import foreseen
 from interpose.cli.console import complain, console, say, say_json
 from interpose.cli.outputs import MADE
-from interpose.errors import FileError, InterposeError, NothingError, RequestError
+from interpose.errors import FileError, NothingError, RequestError
 
 MOTION = (".bvh", ".npz", ".amc")
 # take.filled.bvh and take.forecast.2.bvh lie beside the take.bvh that they were made of.
@@ -24,29 +25,29 @@ PRODUCT = re.compile(rf"(.+)\.(?:{'|'.join(MADE)})(?:\.\d+)?")
 def each(verb: Callable[..., int | None]) -> Callable[..., int]:
     """The verb of one file, for several and for folders: what cannot be done is said, and the next one is.
 
-    Its exit code is the largest of all. With --json it prints one list, an entry for each file.
+    Its exit code is the largest of those that could not be done, or else of all. With --json it prints one
+    list, an entry for each file.
     """
+
+    signature = inspect.signature(verb)
 
     @wraps(verb)
     def many(file: Path, /, *more: Path, **options: Any) -> int:
-        if not more and not file.is_dir():
-            return verb(file, **options) or 0
         folder: Path | None = options.get("output")
+        if not more and not file.is_dir() and (folder is None or not folder.is_dir()):
+            return verb(file, **options) or 0
         found = {path.resolve(): (path, place) for path, place in clips((file, *more), folder)}
         files = [path for path, _ in found.values()]
         if files == [file] and file.is_dir():
             raise _empty(file)
-        if folder is not None and not folder.exists() and folder.suffix.lower() not in MOTION:
-            if not options.get("dry_run"):
-                folder.mkdir(parents=True)
-        elif folder is not None and not folder.is_dir():
+        if folder is not None and (folder.suffix.lower() in MOTION or folder.is_file()):
             raise RequestError(
                 "--output names one file",
                 f"{len(files)} files are to be written",
                 "Name a folder; or leave it out: each lies beside what it was made of.",
             )
-        if folder is not None:
-            _apart([*found.values()])
+        if "output" in signature.parameters:
+            _apart([(path, place if folder is not None else path) for path, place in found.values()])
         codes, reports = [], []
         for path, place in found.values():
             said = StringIO()
@@ -56,7 +57,7 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 if folder is not None:
                     options["output"] = folder / place
                     if not options.get("dry_run"):
-                        options["output"].parent.mkdir(parents=True, exist_ok=True)
+                        (folder / place).parent.mkdir(parents=True, exist_ok=True)
                 with redirect_stdout(said) if options.get("json") else nullcontext():
                     codes.append(verb(path, **options) or 0)
                 reports.append(json.loads(said.getvalue() or "null"))
@@ -65,22 +66,28 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 codes.append(error.code)
                 if not options.get("json"):
                     say(f"{error.what}, but {error.left}" if error.left else error.what)
-            except InterposeError as error:
-                reports.append({"input": str(path), "error": error.what})
-                complain(error)
-                codes.append(error.exit_code)
+            except KeyboardInterrupt:
+                if options.get("json"):
+                    say_json(reports)
+                raise
+            except Exception as error:
+                told = foreseen(error)
+                said_of = {"error": told.what, "why": told.why, "fix": told.fix, "code": told.exit_code}
+                reports.append({"input": str(path), **said_of})
+                complain(told)
+                codes.append(told.exit_code)
             if not options.get("json"):
                 say()
         if options.get("json"):
             say_json(reports)
         done = sum(code == 0 for code in codes)
         console(stderr=True).print(f"{done} of {len(files)} files done")
-        return max(codes)
+        # What could not be done at all before what was left open in what was.
+        return max(codes, key=lambda code: (code not in (0, 4), code))
 
-    said = inspect.signature(verb)
-    first, *rest = said.parameters.values()
+    first, *rest = signature.parameters.values()
     others = inspect.Parameter("more", inspect.Parameter.VAR_POSITIONAL, annotation="Path")
-    many.__signature__ = said.replace(parameters=[first, others, *rest])  # type: ignore[attr-defined]
+    many.__signature__ = signature.replace(parameters=[first, others, *rest])  # type: ignore[attr-defined]
     many.__annotations__ = {**verb.__annotations__, "more": "Path"}
     return many
 
@@ -121,7 +128,7 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
         for one in held:
             made = PRODUCT.fullmatch(one.stem)
             of_other = made is not None and one.with_name(made[1] + one.suffix) in names
-            if not of_other and into not in one.resolve().parents:
+            if not of_other and (into in (None, path.resolve()) or into not in one.resolve().parents):
                 found = True
                 yield one, one.relative_to(path)
         if not found:

@@ -37,7 +37,7 @@ def fill(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str | None = None,
     license: str = "any",
-    max_gap: int | None = None,
+    max_gap: str | None = None,
     only_gap: list[int] = [],  # noqa: B006
     seed: int | None = None,
     player: bool = False,
@@ -85,7 +85,7 @@ def fill(
         output: where to write the filled clip; the report goes beside it. Of several clips a folder.
         method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        max_gap: leave gaps of more than this many frames open, and list them.
+        max_gap: leave gaps of more than so many frames open, or seconds, 3s, and list them.
         only_gap: fill only the gap of this number, counted from 1 in order of time. May be repeated.
         seed: for methods that sample.
         player: write a page (take.filled.html) that plays the result; it opens in any browser.
@@ -98,6 +98,7 @@ def fill(
         check_method,
         from_options,
         layered,
+        length_of,
         part_of,
         parts_to_dict,
         path_of,
@@ -135,16 +136,14 @@ def fill(
         request = replace(request, only=only_gap, why={})
     if seed is not None:
         request = replace(request, seed=seed)
-    if max_gap is not None and max_gap < 1:
-        fix = "Write for example --max-gap 90."
-        raise RequestError(f"--max-gap {max_gap} leaves everything open", "it is a number of frames", fix)
+    most = None if max_gap is None else length_of(max_gap, clip)
     lines = [request.said] * bool(request.said)
     lines += [
         f"{one.file} is on another rig: its motion was retargeted" for one in request.parts if one.retargeted
     ]
     outputs = Outputs.choose(file, output, "filled", player)
     if dry_run:
-        return _dry_run(file, clip, request, points, pins, max_gap, outputs, json, force, gaps)
+        return _dry_run(file, clip, request, points, pins, most, outputs, json, force, gaps)
     for read in (file, *(one.file for one in request.parts)):
         outputs.check(read, force, gaps)
     missing = sum(map(len, request.gaps))
@@ -153,7 +152,7 @@ def fill(
             clip,
             request.gaps,
             request.method,
-            max_gap=max_gap,
+            max_gap=most,
             only=request.only,
             seed=request.seed,
             methods=request.methods,
@@ -163,7 +162,7 @@ def fill(
             path=points,
             pins=pins,
         )
-    why = {number: request.why.get(number) or _why(left, max_gap) for number, left in numbered(done)}
+    why = {number: request.why.get(number) or _why(left, most) for number, left in numbered(done)}
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
     more |= {"layer": True} if layer or request.layer else {}
     more |= {"path": request.path} if request.path else {}

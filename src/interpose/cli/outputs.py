@@ -17,6 +17,7 @@ from interpose.errors import FileError, RequestError
 if TYPE_CHECKING:
     from interpose.clip import Clip
     from interpose.finish import Completion, GapReport
+    from interpose.methods.weights import Card
     from interpose.observation import Gap
 
 # Units of the measures in a report, for whoever reads the JSON.
@@ -187,8 +188,20 @@ def to_json(
             for number, gap in numbered(completion)
         ],
         **{name: report[name] for name in ("moments", "exchanged") if name in report},
+        "weights": [
+            {"name": card.name, "licence": card.licence, "commit": card.training.get("commit")}
+            for card in used(completion)
+        ],
         "units": UNITS,
     }
+
+
+def used(completion: Completion) -> list[Card]:
+    """The cards of the trained weights that had a part in a completion."""
+    from interpose.methods import weights
+
+    models = {gap.model for gap in completion.report.gaps}
+    return [card for card in weights.cards() if card.name in models]
 
 
 def finish(
@@ -214,6 +227,10 @@ def finish(
     else:
         say("\n".join([*describe(file, clip), *([said] if said else []), ""]))
         print_report(completion, clip.fps, why)
+        closed = [card.name for card in used(completion) if not card.open]
+        if closed:
+            named = " and ".join(closed)
+            notes = [f"{named}: for research and non-commercial use; --license open takes others", *notes]
         say("\n".join(["", *(f"note: {note}" for note in notes), outputs.told(dry_run)]))
     return 4 if completion.report.open else 0
 

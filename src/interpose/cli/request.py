@@ -110,11 +110,17 @@ def from_options(
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
             fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."
             raise RequestError("--gap does not go with a report", why, fix)
-        request = (
-            _replay(gaps, filled, content, clip, reading)
-            if is_report(content)
-            else Request([*filled, *listed])
-        )
+        try:
+            request = (
+                _replay(gaps, filled, content, clip, reading)
+                if is_report(content)
+                else Request([*filled, *listed])
+            )
+        except (KeyError, TypeError, AttributeError) as error:
+            why = f"it is no longer as it was written: {type(error).__name__}, {error}"
+            raise RequestError(
+                f"cannot repeat {gaps}", why, "Write its gaps into a list, or run anew."
+            ) from None
     elif listed:
         request = Request(listed)
     elif chosen:
@@ -240,6 +246,18 @@ def frame_of(text: str, clip: Clip) -> int:
         why = f"the clip has {len(clip)} frames, counted from 0"
         raise RequestError(f"there is no frame {text}", why, f"Choose one of 0 to {len(clip) - 1}.")
     return frame
+
+
+def length_of(text: str, clip: Clip) -> int:
+    """Frames from "90", or from "3s". RequestError for what is none, or nothing."""
+    try:
+        frames = frame_at(text, clip.fps)
+    except ValueError:
+        frames = 0
+    if frames < 1:
+        why = "it is a number of frames, or of seconds, and more than none"
+        raise RequestError(f"cannot use --max-gap {text}", why, "Write --max-gap 90, or --max-gap 3s.")
+    return frames
 
 
 def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:

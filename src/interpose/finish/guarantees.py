@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import InterposeError, RequestError
 from interpose.finish import anatomy, feet, floor, jumps, measures, notes, penetration, pins, seams
 from interpose.finish.loose import Layer, loose, without
 from interpose.finish.path import follow, over_floor, spans
@@ -387,7 +387,15 @@ def _said(method: Method, clip: Clip, observation: Observation, seed: int | None
     seen = replace(
         observation, rotation=observation.rotation.copy(), translation=observation.translation.copy()
     )
-    raw = method.complete(own, seen, seed)
+    try:
+        raw = method.complete(own, seen, seed)
+    except InterposeError:
+        raise
+    except Exception as error:
+        why = f"it failed with {type(error).__name__}: {error}"
+        raise RequestError(
+            f"the method {method.name} does not work", why, "Tell those who made it."
+        ) from error
     _sound(raw, clip, method.name)
     return raw
 

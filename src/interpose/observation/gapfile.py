@@ -26,7 +26,7 @@ def read_gaps(path: str | Path) -> list[Gap]:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot read the gaps from {path}", why, "Check the path.") from None

@@ -266,7 +266,11 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     alive = np.flatnonzero(np.nansum(turned, axis=0) > LIFELESS)
     walking = np.flatnonzero(np.nansum(moved, axis=0) > LIFELESS)
     if not len(alive):
-        return []
+        if len(clip) < max(2, clip.fps):
+            return []
+        also = "the body neither, " if not len(walking) else ""
+        note = f"no joint turns at all, {also}in the whole clip of {len(clip) / clip.fps:.2f} s"
+        return [Finding("still", None, first, first + len(turned) + 1, note)]
     found = []
 
     def add(kind: str, joints: tuple[str, ...] | None, run: Run) -> None:
@@ -276,7 +280,13 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         end = run.stop + (0 if run.start == 0 and not run.jumps_out else 1)
         what = "the position stands" if kind == "frozen position" else "nothing moves"
         note = f"{what} for {(run.stop - run.start) / clip.fps:.2f} s"
-        note += ", and comes to rest and sets off by itself" if kind == "still" else ""
+        to_end = run.stop == len(turned)
+        rest = (
+            ", to the end, and comes to rest by itself"
+            if to_end
+            else ", and comes to rest and sets off by itself"
+        )
+        note += rest if kind == "still" else ""
         found.append(Finding(kind, joints, first + begin, first + end, note))
 
     whole = np.asarray(still[:, alive].all(axis=1) & stopped[:, walking].all(axis=1))

@@ -22,7 +22,8 @@ _MOTION = re.compile(rb"(?:\A|[\r\n])[ \t]*MOTION[ \t]*(?=[\r\n]|\Z)", re.IGNORE
 _FRAMES = re.compile(rb"\s*Frames[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 _FRAME_TIME = re.compile(rb"\s*Frame[ \t]*Time[ \t]*:?[ \t]*([^\s:]+)[ \t]*(?=[\r\n]|\Z)", re.IGNORECASE)
 
-LONGEST = 10.0  # seconds that a frame may take: what takes longer is no motion
+# Seconds that a frame may take: what takes longer is no motion, or in milliseconds (4.17 of 240 a second).
+LONGEST = 4.0
 # Rates that people record and deliver at: a rounded frame time such as 0.033333 means one of these.
 RATES = (
     *(10, 12, 12.5, 15, 20, 24000 / 1001, 24, 25, 30000 / 1001, 30, 48, 50, 60000 / 1001, 60, 72, 75, 90),
@@ -134,9 +135,14 @@ def _rate(text: str, seconds: float) -> float:
     """Frames a second: the usual rate within one unit of the last written decimal, else 1 / seconds."""
     mantissa, _, exponent = text.lower().partition("e")
     unit = 10.0 ** (int(exponent or 0) - len(mantissa.partition(".")[2]))
-    near = float(min(RATES, key=lambda rate: abs(1 / rate - seconds)))
-    error = abs(1 / near - seconds)
-    return near if error <= 1.001 * unit and error < 0.02 * seconds else 1 / seconds
+
+    def error(rate: float) -> float:
+        return abs(1 / rate - seconds)
+
+    # What rounds to the number that is written before what is cut off to it; 60 before 59.94 where both do.
+    near = float(min(RATES, key=lambda rate: (error(rate) > 0.501 * unit, rate % 1 > 0, error(rate))))
+    near = near if error(near) <= 0.501 * unit else float(min(RATES, key=error))
+    return near if error(near) <= 1.001 * unit and error(near) < 0.02 * seconds else 1 / seconds
 
 
 def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
