@@ -105,8 +105,18 @@ def test_where_the_floor_is_and_which_way_a_body_faces_makes_no_difference(lying
     np.testing.assert_allclose(there.positions(), elsewhere(here).positions(), atol=1e-6)
 
 
-def test_an_upper_body_tells_no_floor(cmu_walk):
+def test_an_upper_body_stands_at_height_0_or_tells_no_floor(cmu_walk):
     """Of legs that are lost all along: the lowest joint that is known is the hips."""
     legs = tuple(name for name in cmu_walk.skeleton.names if "Leg" in name or "Foot" in name or "Toe" in name)
     seen = Observation.from_gaps(cmu_walk, [Gap(0, len(cmu_walk), legs)])
-    assert floor.lifted(cmu_walk, seen, (0, len(cmu_walk))) is cmu_walk
+    whole, low, high = (0, len(cmu_walk)), np.array([0.0, -0.12, 0.0]), np.array([0.0, 1.0, 0.0])
+    assert floor.lifted(cmu_walk, seen, whole) is cmu_walk
+    under, above = (
+        cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation + way) for way in (low, high)
+    )
+    assert under.positions()[..., 1].min() < -0.1
+    assert floor.lifted(under, seen, whole).positions()[..., 1].min() > -0.03
+    # Who is upstairs may be anywhere.
+    far = cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation + 10 * low)
+    assert floor.lifted(above, seen, whole) is above
+    assert floor.lifted(far, seen, whole) is far

@@ -674,3 +674,11 @@ def test_fuzz(tmp_path_factory, which, edits, cut):
     rotation = np.tile([1.0, 0, 0, 0], (*clip.rotation.shape[:2], 1))
     formats.save(clip.with_motion(rotation, clip.translation), folder / "out.amc", force=True)
     assert len(formats.load(folder / "out.amc", skeleton=folder / "fuzz.asf")) == len(clip)
+
+
+def test_a_motion_that_is_written_away_from_its_skeleton_says_what_it_needs(body, tmp_path):
+    clip, elsewhere = formats.load(body), tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    (note,) = formats.save(clip, elsewhere / "a.amc")
+    assert ".asf" in note
+    assert not formats.save(clip, body.with_name("again.amc"))

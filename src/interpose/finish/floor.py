@@ -1,7 +1,7 @@
 """Nobody goes through the floor: what is lower than all that is known nearby is lifted, the body with it.
 
 How feet stand is a matter of `finish/feet.py`; here it is about who lies, crawls or falls, and what is left.
-The floor is the lowest joint that is observed nearby, as nothing else tells where it is.
+The floor is the lowest joint that is observed nearby; where no foot is, it is taken for height 0.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ SHARES, FEET = (1e-1, 1e-2), 10.0
 # Seconds that are to be known for feet to tell the floor; else they are lifted under hips that are lower than
 # this (metres) above it, as those of a body that does not stand. What is as far above the lowest is none.
 SEEN, LOW, ABOUT = 1.0, 0.5, 0.2
+# How high hips are, in legs, of a body that stands or crouches on the floor.
+UPRIGHT = (0.75, 1.2)
 # Metres that are no lift.
 NOTHING = 1e-4
 
@@ -38,15 +40,17 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
     That is the lowest observed joint of poses of which a foot is; for ankles, and for toes, the lowest one of
     these, where that is about as low: knees on which a body kneels may lie deeper than feet ever do. The
     joints are those of the humanoid; what is observed is 0 deep, and so are feet under hips that stand, where
-    little is known: a single pose may have them in the air. Where no foot is observed nothing is deep: an
-    upper body tells no floor.
+    little is known: a single pose may have them in the air. Where no foot is observed the floor is at height
+    0, as in most files, if hips are where those of a body are that stands on it; else nothing is deep.
     """
     mapping, size = find_mapping(clip.skeleton), feet.size(clip.skeleton)
     joints, ends = list(mapping.mapped[1]), feet.ends(clip.skeleton)
     heights, observed = clip.positions()[..., 1], known.positions(clip.skeleton)
     tells = observed[:, ends].any(axis=1)
-    if not tells.any() or no_humanoid(mapping):
+    if no_humanoid(mapping) or not (tells.any() or _upright(clip, observed, mapping.leg_length)):
         return np.zeros((len(clip), len(joints))), joints
+    if not tells.any():
+        return np.where(observed, 0.0, -heights)[:, joints], joints
     heard = np.where(observed, heights, np.inf)[tells]
     low = float(heard.min())
     bound = np.full(len(clip.skeleton), low)
@@ -58,6 +62,13 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
         stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
         below[:, ends] *= ~stands[:, None]
     return below[:, joints], joints
+
+
+def _upright(clip: Clip, observed: np.ndarray, leg: float) -> bool:
+    """Whether observed hips, at their highest, are as far above height 0 as those of a body on it."""
+    hips = hips_of(clip.skeleton)
+    high = clip.positions()[observed[:, hips], hips, 1].max(initial=-np.inf)
+    return bool(UPRIGHT[0] * leg < high < UPRIGHT[1] * leg)
 
 
 def lifted(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:

@@ -222,10 +222,7 @@ def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) ->
         return []
     if ahead:
         said = f"flagged: most of it moves {100 * alive:.0f} % as much as the motion before it"
-        lively = "--method stmi-gan keeps moving"
-        return [
-            said if method.startswith("stmi-gan") else f"{said}: a mean of many possible motions. {lively}"
-        ]
+        return [said if method.startswith("stmi-gan") else f"{said}: a mean of many possible motions"]
     return [
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
         f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"

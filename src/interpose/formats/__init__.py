@@ -106,7 +106,7 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         force: replace an existing file.
 
     Returns:
-        Notes on what the format cannot hold, usually none.
+        Notes on what the format cannot hold, and what else a file needs to be read; usually none.
 
     Raises:
         RequestError: the suffix is unknown, the folder is missing, the file exists and `force` is False, or
@@ -132,7 +132,18 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         raise FileError(
             f"cannot write {path}", error.strerror or str(error), "Choose another folder with -o."
         ) from None
-    return notes
+    return (*notes, *_alone(path))
+
+
+def _alone(path: Path) -> tuple[str, ...]:
+    """A note where a motion lies apart from the skeleton file that it cannot be read without."""
+    if path.suffix.lower() != ".amc":
+        return ()
+    try:
+        asf_amc.find_asf(path)
+    except FileError:
+        return (f"{path.name} is read with its .asf file: put that beside it, or name it with --skeleton",)
+    return ()
 
 
 def _format(path: Path) -> Format:
