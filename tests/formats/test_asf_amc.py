@@ -362,7 +362,7 @@ def test_only_changed_numbers_change(data, tmp_path):
     turn = rotations.exp(np.array([0.2, -0.1, 0.3]))
     rotation[10:15, thigh] = -rotations.multiply(turn, rotation[10:15, thigh])
     translation[20, 0, 1] += 0.01
-    assert formats.save(clip.with_motion(rotation, translation), tmp_path / "b.amc") == ()
+    formats.save(clip.with_motion(rotation, translation), tmp_path / "b.amc")
     for frame, (was, now) in enumerate(zip(numbers(path), numbers(tmp_path / "b.amc"), strict=True)):
         differs = {(bone, i) for bone in was for i, text in enumerate(was[bone]) if now[bone][i] != text}
         if 10 <= frame < 15:
