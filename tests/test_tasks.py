@@ -576,3 +576,14 @@ def test_a_part_of_what_a_method_said_is_of_its_frames(cmu_walk):
     done = tasks.between(cmu_walk, [40, 80], cut=True)
     assert done.raw.stands is not None
     assert len(done.raw.stands) == len(done.raw.expected) == len(done.raw.clip) == len(done.clip) == 41
+
+
+def test_means_of_a_gap_in_pieces_count_frames_and_the_worst_stays():
+    pieces = [
+        GapReport(0, 30, None, "small", number=1, foot_slide=4.0, seam_after=1.0),
+        GapReport(30, 120, None, "small", number=1, foot_slide=8.0, seam_after=0.5),
+        GapReport(120, 160, None, "small", number=1, foot_slide=1.0, seam_after=0.2),
+    ]
+    (whole,) = windows.joined(pieces)
+    assert (whole.start, whole.stop, whole.seam_after) == (0, 160, 1.0)
+    assert whole.foot_slide == pytest.approx((30 * 4 + 90 * 8 + 40 * 1) / 160)

@@ -9,6 +9,8 @@ import pytest
 
 from interpose import tasks
 from interpose.formats import load
+from interpose.geometry import rotations
+from interpose.geometry.ground import turn
 from interpose.observation.gait import in_step, legs, stride
 from interpose.observation.timeline import Placement
 from interpose.skeletons import find_humanoid
@@ -46,3 +48,20 @@ def test_what_does_not_walk_has_no_strides(cmu_walk):
     assert stride(legs(body.positions(still), 30.0), 30.0) is None
     assert in_step(body, still, cmu_walk) is None
     assert in_step(body, stands, stands) is None
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_a_walk_in_a_circle_goes_on_along_it(walk, side):
+    """The straight walk bent to one side, by a degree a frame, and cut: what follows heads as it did."""
+    way = np.arange(len(walk))
+    yaw = np.radians(side * way)
+    turned, placed = walk.rotation.copy(), walk.translation.copy()
+    turned[:, 0] = rotations.multiply(rotations.about("Y", yaw), turned[:, 0])
+    steps = turn(np.diff(walk.root, axis=0) * [1.0, 0.0, 1.0], yaw[1:])
+    placed[:, 0, [0, 2]] = walk.root[0, [0, 2]]
+    placed[1:, 0, [0, 2]] += np.cumsum(steps, axis=0)[:, [0, 2]]
+    circle = walk.with_motion(turned, placed)
+    found = in_step(find_humanoid(circle), circle.slice(0, 90), circle.slice(100, len(circle)))
+    assert np.degrees(found.rate) == pytest.approx(side, abs=0.2)
+    yaw = found.yaw + found.rate * 11
+    assert np.degrees(np.angle(np.exp(1j * yaw))) == pytest.approx(0, abs=6)

@@ -60,17 +60,18 @@ def _body(clip: Clip) -> tuple[Humanoid, list[int]] | None:
     return body, [rows[shin] for _, shin in LEGS]
 
 
-def inside_out(opinion: Clip, known: Observation, span: Span) -> str | None:
-    """Why a motion is none of a person's in a span, if so: a knee that is not observed is inside out."""
-    part = opinion.slice(span.start, span.stop)
-    if (found := _body(part)) is None:
-        return None
+def inside_out(opinion: Clip, known: Observation, spans: list[Span]) -> None:
+    """Say of spans that their motion is no person's where a knee that is not observed is inside out."""
+    if (found := _body(opinion)) is None:
+        return
     body, joints = found
-    twist, _ = knees(body.rotations(part))
-    free = ~known.rotation[span.start : span.stop, joints]
-    if not free.any() or (worst := float(twist[free].max())) <= INSIDE_OUT:
-        return None
-    return f"a knee turns inside out (by {worst:.0f} degrees)"
+    twist, _ = knees(body.rotations(opinion))
+    seen = known.rotation[:, joints]
+    most = max(INSIDE_OUT, OWN * float(twist[seen].max(initial=0.0)))
+    worst = np.where(seen, 0.0, twist).max(axis=1)
+    for span in spans:
+        if (here := float(worst[span.start : span.stop].max())) > most:
+            span.problem = span.problem or f"a knee turns inside out (by {here:.0f} degrees)"
 
 
 def straightened(opinion: Clip, known: Observation) -> Clip:

@@ -150,9 +150,10 @@ def complete(
             for span in chosen:
                 jumps.soften(current, firm, span, limit)
 
+    if not isinstance(method, Layer):
+        anatomy.inside_out(opinion, known, spans)
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
-        span.problem = span.problem or anatomy.inside_out(opinion, known, span)
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
