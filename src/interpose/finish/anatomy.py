@@ -61,14 +61,16 @@ def _body(clip: Clip) -> tuple[Humanoid, list[int]] | None:
 
 
 def inside_out(opinion: Clip, known: Observation, spans: list[Span]) -> None:
-    """Say of spans that their motion is no person's where a knee that is not observed is inside out."""
+    """Say of spans that their motion is no person's where nothing is known and a knee is inside out.
+
+    Of a leg that is lost alone nothing is gained by another method, which may know nothing of it at all.
+    """
     if (found := _body(opinion)) is None:
         return
     body, joints = found
     twist, _ = knees(body.rotations(opinion))
-    seen = known.rotation[:, joints]
-    most = max(INSIDE_OUT, OWN * float(twist[seen].max(initial=0.0)))
-    worst = np.where(seen, 0.0, twist).max(axis=1)
+    most = max(INSIDE_OUT, OWN * float(twist[known.rotation[:, joints]].max(initial=0.0)))
+    worst = np.where(known.rotation.any(axis=1), 0.0, twist.max(axis=1))
     for span in spans:
         if (here := float(worst[span.start : span.stop].max())) > most:
             span.problem = span.problem or f"a knee turns inside out (by {here:.0f} degrees)"
@@ -77,16 +79,18 @@ def inside_out(opinion: Clip, known: Observation, spans: list[Span]) -> None:
 def straightened(opinion: Clip, known: Observation) -> Clip:
     """A motion with knees that do not bend forwards where they are not observed, unless they do so elsewhere.
 
-    Shins give way; thighs, and how feet lie, stay.
+    Shins give way; thighs, and how feet lie, stay. Where a shin is twisted more than any is, nothing tells
+    which way is forwards.
     """
     if (found := _body(opinion)) is None:
         return opinion
     body, joints = found
     turned = body.rotations(opinion)
-    _, bend = knees(turned)
+    twist, bend = knees(turned)
     free = ~known.rotation[:, joints]
+    sure = np.clip((INSIDE_OUT - twist) / (0.5 * INSIDE_OUT), 0.0, 1.0)
     least = np.minimum(np.where(free, 0.0, bend).min(axis=0), 0.0)
-    more = np.where(free, rounded(least - bend, ROUND), 0.0)
+    more = np.where(free, sure * rounded(least - bend, ROUND), 0.0)
     if not (more > ROUND).any():
         return opinion
     for column, (_, shin) in enumerate(LEGS):

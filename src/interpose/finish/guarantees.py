@@ -120,8 +120,8 @@ def complete(
         for span in spans:
             if lost[span.start : span.stop].any():
                 span.notes.append((span.start, span.stop - 1, STOOD))
-        opinion = anatomy.straightened(opinion, known)
         if raw.positions is None:
+            opinion = anatomy.straightened(opinion, known)
             firm = anatomy.locked(hidden, known)
             opinion = _merge(opinion, hidden, firm)
     opinion = held(opinion, clip.source)
