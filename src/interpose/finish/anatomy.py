@@ -60,20 +60,25 @@ def _body(clip: Clip) -> tuple[Humanoid, list[int]] | None:
     return body, [rows[shin] for _, shin in LEGS]
 
 
-def inside_out(opinion: Clip, known: Observation, spans: list[Span]) -> None:
-    """Say of spans that their motion is no person's where nothing is known and a knee is inside out.
+def inside_out(opinion: Clip, known: Observation, span: Span, instead: bool) -> None:
+    """Say of a span that its motion is no person's where nothing is known and a knee is inside out.
 
-    Of a leg that is lost alone nothing is gained by another method, which may know nothing of it at all.
+    That is a problem if there is another network `instead`, and else a note: a curve from one end to the
+    other is no person's motion either. Nor is anything gained by others of a leg that is lost alone.
     """
     if (found := _body(opinion)) is None:
         return
     body, joints = found
     twist, _ = knees(body.rotations(opinion))
     most = max(INSIDE_OUT, OWN * float(twist[known.rotation[:, joints]].max(initial=0.0)))
-    worst = np.where(known.rotation.any(axis=1), 0.0, twist.max(axis=1))
-    for span in spans:
-        if (here := float(worst[span.start : span.stop].max())) > most:
-            span.problem = span.problem or f"a knee turns inside out (by {here:.0f} degrees)"
+    worst = np.where(known.rotation.any(axis=1), 0.0, twist.max(axis=1))[span.start : span.stop]
+    if worst.max() <= most:
+        return
+    frame, said = span.start + int(worst.argmax()), f"a knee turns inside out (by {worst.max():.0f} degrees)"
+    if instead:
+        span.problem = span.problem or said
+    else:
+        span.notes.append((frame, frame, f"flagged: {said}"))
 
 
 def straightened(opinion: Clip, known: Observation) -> Clip:
