@@ -110,3 +110,13 @@ def test_joints_that_never_turn_stay_as_they_are(cmu_walk):
     )
     moves = filled(cmu_walk, Turning("LeftToeBase", "X", hill(40))).clip.rotation[INSIDE, toe]
     assert np.abs(moves - rotation[INSIDE, toe]).max() > 0.1
+
+
+def test_nobody_is_told_to_key_what_comes_next(cmu_walk):
+    """A body that spins at the end of a clip, where a forecast goes on, and within it."""
+    method = Turning("Hips", "Y", 360.0 * np.clip((np.arange(len(GAP)) - 10) / 20, 0, 1))
+    inside, ahead = (filled(clip, method) for clip in (cmu_walk, cmu_walk.slice(0, GAP.stop)))
+    said = [
+        [note for note in done.report.gaps[0].notes if "Hips turns by" in note] for done in (inside, ahead)
+    ]
+    assert [note[0].endswith("help") for note in said] == [True, False]

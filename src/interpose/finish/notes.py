@@ -91,7 +91,13 @@ def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
     if size[row, joint] <= WILD * feet.size(finished.skeleton):
         return []
     where = f"{finished.skeleton.names[joint]} jumps at frame {first + int(frames[row])}"
-    return [f"flagged: {where}, by {size[row, joint]:.0f} m/s^2. More frames, or a key near there, help"]
+    said = f"flagged: {where}, by {size[row, joint]:.0f} m/s^2"
+    return [said + _helps(finished, gap, ". More frames, or a key near there, help")]
+
+
+def _helps(finished: Clip, gap: Gap, what: str) -> str:
+    """What would help; nothing of what comes next, whose end nobody can key."""
+    return "" if gap.stop == len(finished) else what
 
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:
@@ -167,7 +173,7 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
         said = (
             f"flagged: it goes backwards at up to {back[frame] * size:.1f} m/s (frame {first + lo + frame})"
         )
-        return [f"{said}: more frames, or a key in which it has turned, help"]
+        return [said + _helps(finished, gap, ": more frames, or a key in which it has turned, help")]
     fastest, usual = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
     if seen.sum() >= fps / 2 and fastest > HURRIES * max(usual, SLOW):
         frames = math.ceil(len(gap) * fastest / max(usual, SLOW))
@@ -185,10 +191,9 @@ def whirling(finished: Clip, known: Observation, gap: Gap, first: int) -> list[s
     if found := anatomy.whirl(part, seen, gap.start - lo, gap.stop - lo):
         name = finished.skeleton.names[found.joint]
         usual = f", around the gap by {found.usual:.0f} at most" if found.usual else ""
-        return [
-            f"flagged: {name} turns by {found.rate:.0f} degrees a second at frame "
-            f"{first + lo + found.frame}{usual}: more frames, or a key there, help"
-        ]
+        where = f"at frame {first + lo + found.frame}{usual}"
+        said = f"flagged: {name} turns by {found.rate:.0f} degrees a second {where}"
+        return [said + _helps(finished, gap, ": more frames, or a key there, help")]
     ends = gap.start - 1 - lo, gap.stop - lo
     if gap.joints is not None or ends[0] < 0 or ends[1] >= len(part):
         return []
