@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 
 import numpy as np
 import pytest
@@ -129,8 +130,9 @@ def test_what_is_said_of_an_amc_clip_is_what_its_file_holds(data, tmp_path, gap,
     clip = formats.load(data / "cmu_02_03.amc")
     done = tasks.fill(clip, [gap], method).clip
     assert np.abs(done.rotation - clip.rotation)[gap.start : gap.stop].max() > 1e-3
+    shutil.copy(data / "cmu_02.asf", tmp_path)
     assert formats.save(done, tmp_path / "filled.amc") == ()
-    back = formats.load(tmp_path / "filled.amc", skeleton=data / "cmu_02.asf")
+    back = formats.load(tmp_path / "filled.amc")
     assert np.abs(back.positions() - done.positions()).max() < 1e-4
 
 
