@@ -60,8 +60,8 @@ def _body(clip: Clip) -> tuple[Humanoid, list[int]] | None:
     return body, [rows[shin] for _, shin in LEGS]
 
 
-def inside_out(opinion: Clip, known: Observation, span: Span, instead: bool) -> None:
-    """Say of a span that its motion is no person's where nothing is known and a knee is inside out.
+def inside_out(opinion: Clip, known: Observation, spans: list[Span], instead: bool) -> None:
+    """Say of spans that their motion is no person's where nothing is known and a knee is inside out.
 
     That is a problem if there is another network `instead`, and else a note: a curve from one end to the
     other is no person's motion either. Nor is anything gained by others of a leg that is lost alone.
@@ -71,14 +71,19 @@ def inside_out(opinion: Clip, known: Observation, span: Span, instead: bool) -> 
     body, joints = found
     twist, _ = knees(body.rotations(opinion))
     most = max(INSIDE_OUT, OWN * float(twist[known.rotation[:, joints]].max(initial=0.0)))
-    worst = np.where(known.rotation.any(axis=1), 0.0, twist.max(axis=1))[span.start : span.stop]
-    if worst.max() <= most:
-        return
-    frame, said = span.start + int(worst.argmax()), f"a knee turns inside out (by {worst.max():.0f} degrees)"
-    if instead:
-        span.problem = span.problem or said
-    else:
-        span.notes.append((frame, frame, f"flagged: {said}"))
+    worst = np.where(known.rotation.any(axis=1), 0.0, twist.max(axis=1))
+    for span in spans:
+        here = worst[span.start : span.stop]
+        if here.max() <= most:
+            continue
+        frame, said = (
+            span.start + int(here.argmax()),
+            f"a knee turns inside out (by {here.max():.0f} degrees)",
+        )
+        if instead:
+            span.problem = span.problem or said
+        else:
+            span.notes.append((frame, frame, f"flagged: {said}"))
 
 
 def straightened(opinion: Clip, known: Observation) -> Clip:
@@ -112,7 +117,7 @@ def straightened(opinion: Clip, known: Observation) -> Clip:
 def locked(clip: Clip, known: Observation) -> Observation:
     """What is known, and that joints stay as they are that never turn where they are seen, while others do.
 
-    Toes of some rigs have never been captured, and a hinge has axes that its rig locks.
+    Toes of some rigs have never been captured, nor what stands between hips and thighs.
     """
     still = np.zeros(len(clip.skeleton), bool)
     for joint in np.flatnonzero(known.rotation.sum(axis=0) >= clip.fps):
@@ -173,12 +178,17 @@ def calm(current: Clip, known: Observation, span: Span) -> None:
             free[max(start, found.frame - half) : min(stop, found.frame + half), found.joint] = True
             done = Spline().complete(led, Observation(~free | seen.rotation, np.ones_like(free))).clip
             again = whirl(done, seen, start, stop, fixed | stuck)
-            if again is None or (again.joint, again.frame) != (found.joint, found.frame):
+            if again is None or again.joint != found.joint or _milder(again, found):
                 led = done
                 break
         else:
             stuck.add(found.joint)
     write(current, led, span.start, (start, stop))
+
+
+def _milder(one: Whirl, other: Whirl) -> bool:
+    """Whether a joint whirls elsewhere than before, and no faster."""
+    return one.frame != other.frame and one.rate <= other.rate
 
 
 def turning(clip: Clip) -> np.ndarray:

@@ -150,10 +150,10 @@ def complete(
             for span in chosen:
                 jumps.soften(current, firm, span, limit)
 
+    if not isinstance(method, Layer):
+        anatomy.inside_out(opinion, known, spans, instead=not isinstance(fallback, Spline))
     for span in spans:
         span.problem = span.problem or _lost(opinion, hidden, known, span)
-        if not isinstance(method, Layer):
-            anatomy.inside_out(opinion, known, span, not isinstance(fallback, Spline))
         span.hopeless = span.problem is not None
     settle([span for span in spans if not span.problem], opinion)
     for span in spans:
