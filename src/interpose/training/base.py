@@ -39,7 +39,8 @@ JUDGED = 10 + 45 + 1  # frames of a window that is validated: known ones, the lo
 STANDS = 0.005
 STANDING = Constant(FEET)
 TYPICAL = 0.05  # metres that the starting point is off, in gaps of a second
-# How often each kind of task is drawn, by what is to be learned: all of them, or in-betweening alone.
+# How often each kind of task is drawn, by what is to be learned: all of them, all of them by who knows whole
+# poses already and not yet single joints, or in-betweening alone.
 TASKS: dict[str, dict[str, float]] = {
     "all": {
         "gap": 0.44,
@@ -52,6 +53,19 @@ TASKS: dict[str, dict[str, float]] = {
         "path": 0.03,
         "pins": 0.05,
         "forecast": 0.05,
+        "noise": 0.05,
+    },
+    "parts": {
+        "gap": 0.26,
+        "gaps": 0.03,
+        "keys": 0.1,
+        "joints": 0.12,
+        "limbs": 0.14,
+        "half": 0.08,
+        "moments": 0.05,
+        "path": 0.03,
+        "pins": 0.05,
+        "forecast": 0.09,
         "noise": 0.05,
     },
     "gap": {"gap": 1.0},
