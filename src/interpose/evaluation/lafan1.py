@@ -21,7 +21,7 @@ from interpose.datasets import clips
 from interpose.errors import RequestError, unknown
 from interpose.evaluation.table import markdown
 from interpose.finish import complete, feet, measures, seams
-from interpose.finish.guarantees import wipe
+from interpose.finish.opinion import wipe
 from interpose.geometry import kinematics, rotations
 from interpose.methods import registry
 from interpose.methods.protocol import Actor, Method

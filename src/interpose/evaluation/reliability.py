@@ -18,7 +18,7 @@ from scipy.stats import spearmanr
 from interpose.errors import RequestError
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import DATASETS, windows
-from interpose.finish.guarantees import wipe
+from interpose.finish.opinion import wipe
 from interpose.methods import registry
 from interpose.show import line_plot
 

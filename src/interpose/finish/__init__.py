@@ -1,6 +1,6 @@
 """The guarantees: what makes a completion usable, the same for every method."""
 
-from interpose.finish.guarantees import complete
+from interpose.finish.completing import complete
 from interpose.finish.report import Completion, GapReport, Provenance, Report
 from interpose.finish.retargeting import on_rig_of, retarget
 from interpose.finish.solve import solve

@@ -8,7 +8,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.finish import Completion, Provenance
-from interpose.finish.guarantees import wipe
+from interpose.finish.opinion import wipe
 from interpose.finish.report import JointMoments
 from interpose.geometry.time import runs
 from interpose.methods.classical import Spline

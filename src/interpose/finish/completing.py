@@ -1,0 +1,213 @@
+"""The one place where a clip is completed: any method, then the guarantees.
+
+What is pinned, led along a path or laid on a body is completed without that first, brought there, and given
+the guarantees once more: as a method of its own that says what it was brought to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.finish import pins
+from interpose.finish.guarantees import Ask, guaranteed
+from interpose.finish.loose import Layer, loose, without
+from interpose.finish.opinion import certain, wipe
+from interpose.finish.path import follow, over_floor, spans
+from interpose.finish.report import Completion, GapReport, Provenance
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Method, Raw
+from interpose.observation import Gap, Observation, Pin
+
+# A share of all joints: so many laid on a body are most of it.
+MOST = 0.5
+# Metres from where it would be at which a pinned joint is asked about.
+FAR = 1.5
+# Metres by which nobody is led elsewhere.
+UNMOVED = 0.01
+# A path on which the hips go this much further than without it is said to be too long.
+FURTHER = 1.5
+
+
+def complete(
+    clip: Clip,
+    observation: Observation,
+    method: Method,
+    seed: int | None = None,
+    fallback: Method | None = None,
+    limit: float | None = None,
+    path: Mapping[int, np.ndarray] | None = None,
+    first: int = 0,
+) -> Completion:
+    """Complete a clip by a method, and make the result usable.
+
+    Observed values come back bit for bit, bones keep their lengths, there is no pop at seams, planted feet
+    stay planted, and what is unobserved in `clip` has no influence on anything. Gaps that the method refuses,
+    or at whose seams it fails, are filled by `fallback` (default: the spline), which the report names.
+
+    Args:
+        clip: F frames; its unobserved values may be anything.
+        observation: what is known, (F, J).
+        method: what completes it.
+        seed: for methods that sample.
+        fallback: the simpler method.
+        limit: metres per frame squared, the largest velocity jump allowed at a seam, when `clip` is a window
+            of a longer one. Default: the 95th percentile of the clip's own.
+        path: x and z in metres that the hips are to be over, by frame; inside of gaps of the whole pose.
+        first: the number by which notes call the first frame, when `clip` is a window of a longer one.
+
+    Raises:
+        RequestError: the observation or one of its pins does not fit the clip, nothing fills a gap, or a
+            point of the path lies in no gap of the whole pose with known frames on both sides.
+    """
+    observation.check(clip)
+    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limit, first), path)
+
+
+def _complete(
+    clip: Clip, observation: Observation, ask: Ask, path: Mapping[int, np.ndarray] | None
+) -> Completion:
+    if observation.pins:
+        return _pinned(clip, observation, ask, path)
+    if path:
+        return _along(path, clip, observation, ask)
+    hidden = wipe(clip, observation)
+    if not isinstance(ask.method, Layer):
+        hanging = loose(hidden, certain(hidden, observation))
+        if hanging.any():
+            return _laid(hanging, clip, observation, ask)
+    return guaranteed(clip, hidden, observation, ask)
+
+
+def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
+    """Complete the body on which known joints (F, J) hang, and lay them on it."""
+    body = _complete(clip, without(observation, hanging), ask, None)
+    layer = Layer(ask.method.name, body.clip, body.raw, hanging)
+    # Where some joints that are laid on a body jump, another body would not help: it is said, and this
+    # one kept. Where most of them are, it is rather the body that does not fit.
+    simpler: Method = layer if hanging.any(axis=0).mean() < MOST else ask.fallback
+    return _told_of(body, _complete(clip, observation, replace(ask, method=layer, fallback=simpler), None))
+
+
+def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation, ask: Ask) -> Completion:
+    """Complete a clip, lead the hips along the path, and make the result usable once more."""
+    known = certain(clip, observation)
+    gaps = spans(clip, known, path)
+    body = _complete(clip, observation, ask, None)
+    led = body.clip
+    for start, stop in gaps:
+        if points := {frame: point for frame, point in path.items() if start <= frame < stop}:
+            led = follow(led, start, stop, points)
+    nothing = np.zeros_like(known.rotation)
+    # Who goes there anyway stands as firmly as before.
+    same = bool(np.abs(led.positions() - body.clip.positions()).max() < UNMOVED)
+    layer = Layer(ask.method.name, led, body.raw, nothing, stands=same)
+    done = _told_of(body, _complete(clip, observation, replace(ask, method=layer, fallback=layer), None))
+    ways = over_floor(body.clip), over_floor(done.clip)
+
+    def judged(gap: GapReport) -> GapReport:
+        off = [ways[1][f] - p for f, p in path.items() if gap.start <= f < gap.stop]
+        if not off:
+            return gap
+        missed = 100 * float(np.linalg.norm(off, axis=1).max())
+        notes = [f"the path is met within {missed:.1f} cm"]
+        own, new = (
+            np.linalg.norm(np.diff(way[gap.start - 1 : gap.stop + 1], axis=0), axis=1).sum() for way in ways
+        )
+        if new > FURTHER * own:
+            notes.append(
+                f"flagged: its way of {new:.1f} m is {new / own:.1f} times as long as without the path, and "
+                "steps are too short for it. A longer gap or a nearer point helps"
+            )
+        return replace(gap, path=missed, notes=(*gap.notes, *notes))
+
+    reports = [judged(gap) for gap in done.report.gaps]
+    return replace(done, report=replace(done.report, gaps=reports))
+
+
+@dataclass
+class _Told:
+    """A method that is told pins, which those who know nothing of pins leave alone."""
+
+    name: str
+    method: Method
+    pins: tuple[Pin, ...]
+
+    def refuses(self, clip: Clip, gap: Gap) -> str | None:
+        return self.method.refuses(clip, gap)
+
+    def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
+        return self.method.complete(clip, replace(observation, pins=self.pins), seed)
+
+
+def _pinned(
+    clip: Clip, observation: Observation, ask: Ask, path: Mapping[int, np.ndarray] | None
+) -> Completion:
+    """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
+    pins.check(clip, observation)
+    asked, free = pins.merged(observation.pins), replace(observation, pins=())
+    known = certain(clip, free)
+    unled = _complete(clip, free, ask, path)
+    # A network that is told of one frame changes that frame: it is told the whole way there and back.
+    ways = pins.ways(unled.clip, known, asked)
+    told = _Told(ask.method.name, ask.method, ways)
+    body = _complete(clip, free, replace(ask, method=told), path) if ways else unled
+    met = pins.meet(body.clip, known, asked)
+    layer = Layer(ask.method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
+    done = _told_of(body, _complete(clip, free, replace(ask, method=layer, fallback=layer), None))
+    off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
+    away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(unled.clip, asked)}
+    way = over_floor(done.clip)
+
+    def judged(gap: GapReport) -> GapReport:
+        points = [np.linalg.norm(way[f] - p) for f, p in (path or {}).items() if gap.start <= f < gap.stop]
+        if points:
+            missed = 100 * float(max(points))
+            gap = replace(gap, path=missed, notes=(*gap.notes, f"the path is met within {missed:.1f} cm"))
+        inside = [one for one in off if gap.start <= one[1] < gap.stop]
+        if not inside:
+            return gap
+        worst = max(inside, key=lambda one: one[2] / (100 * one[0].tolerance))
+        notes = [f"the pins are met within {max(distance for *_, distance in inside):.2f} cm"]
+        if worst[2] > 100 * worst[0].tolerance:
+            notes.append(
+                f"flagged: {worst[0].joint} misses its pin at frame {ask.first + worst[1]} by {worst[2]:.1f} "
+                "cm: it is out of reach, or pins contradict each other"
+            )
+        far, where = max((away[pin.joint, frame], (pin.joint, ask.first + frame)) for pin, frame, _ in inside)
+        if far > FAR:
+            notes.append(
+                f"flagged: {where[0]} is pinned {far:.1f} m from where it would be at frame {where[1]}: "
+                "is the unit right?"
+            )
+        return replace(gap, pins=max(distance for *_, distance in inside), notes=(*gap.notes, *notes))
+
+    reports = [judged(gap) for gap in done.report.gaps]
+    return replace(done, report=replace(done.report, gaps=reports))
+
+
+def _told_of(body: Completion, done: Completion) -> Completion:
+    """What was laid on a body, or led, with what its report says of gaps that a simpler method filled."""
+    before = {
+        frame: gap
+        for gap in body.report.gaps
+        if gap.method != done.report.method
+        for frame in range(gap.start, gap.stop)
+    }
+    reports = [
+        replace(
+            gap,
+            method=one.method,
+            model=None,
+            notes=(*(n for n in one.notes if n not in gap.notes), *gap.notes),
+        )
+        if (one := before.get(gap.start)) and gap.method == done.report.method
+        else gap
+        for gap in done.report.gaps
+    ]
+    fell = (body.provenance == Provenance.FALLBACK) & (done.provenance != Provenance.OBSERVED)
+    provenance = np.where(fell, Provenance.FALLBACK, done.provenance).astype(done.provenance.dtype)
+    return replace(done, provenance=provenance, report=replace(done.report, gaps=reports))

@@ -1,0 +1,122 @@
+"""What is said of each gap once it is filled, and where each value comes from."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.finish import feet, jumps, measures, notes, penetration, seams
+from interpose.finish.report import GapReport, Provenance
+from interpose.finish.span import Span
+from interpose.geometry import rotations
+from interpose.methods.protocol import Raw
+from interpose.observation import Gap, Observation
+
+
+def gap_report(
+    finished: Clip,
+    known: Observation,
+    gap: Gap,
+    span: Span,
+    raw: Raw,
+    error: np.ndarray | None,
+    before: float | None,
+    bounds: jumps.Bounds | None,
+    unheld: tuple[float, float] | None,
+    held: tuple[float, float] | None,
+    method: str,
+    first: int,
+) -> GapReport:
+    part = finished.slice(gap.start, gap.stop)
+    own = span.method == method
+    skeleton = finished.skeleton
+    lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
+    lengths[list(finished.translated)] = np.nan
+    after = jumps.largest(finished, known, jumps.beside(gap), seams.seam_jumps)
+    alive = None if gap.joints is not None else notes.liveliness(finished, gap)
+    glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
+    networks = gap.joints is None and "model" in raw.notes
+    never = [] if own and "model" in raw.notes else notes.never(known, gap, skeleton.names)
+    inside = penetration.deepest(finished, gap.start, gap.stop, first)
+    # It speaks of all joints: where most of them are known it would mislead.
+    risk = raw.expected[gap.start : gap.stop] if raw.expected is not None else None
+    if gap.joints is not None or not own or risk is None or not np.isfinite(risk).all():
+        risk = None
+    solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
+    return GapReport(
+        gap.start,
+        gap.stop,
+        gap.joints,
+        span.method,
+        model=raw.notes.get("model") if own else None,
+        solve_error=_centi(solved),
+        seam_before=_centi(before),
+        seam_after=_centi(after),
+        seam_limit=_centi(bounds.seam if bounds else None),
+        peak=_centi(jumps.largest(finished, known, np.arange(gap.start, gap.stop))),
+        peak_limit=_centi(bounds.peak if bounds else None),
+        bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
+        foot_slide=held[0] if held else None,
+        foot_slide_before=unheld[0] if unheld else None,
+        foot_travel=held[1] if held else None,
+        penetration=_centi(inside[0] if inside else None),
+        liveliness=alive,
+        gliding=glide[0] if glide else None,
+        drift=_centi(_drift(raw.notes, gap)) if own else None,
+        expected=_centi(float(np.mean(risk))) if risk is not None else None,
+        notes=(
+            *span.told(gap),
+            *((inside[1],) if inside and inside[1] else ()),
+            *notes.sized(skeleton),
+            *notes.sunk(finished, known, gap, first),
+            *notes.dull(alive, gap, first, ahead, span.method),
+            *notes.adrift(glide, finished, gap),
+            *notes.skids(held[0] if held else None, finished, known, gap),
+            *notes.hasty(finished, known, gap, first),
+            *notes.whirling(finished, known, gap, first),
+            *([] if bounds else notes.wild(finished, known, gap, first)),
+            *notes.doubtful(risk, gap, first, ahead),
+            *(notes.scant(known, gap, finished.fps) if networks else ()),
+            *notes.rests(never, span.method),
+            *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
+        ),
+    )
+
+
+def provenance(
+    known: Observation, spans: list[Span], method: str, opinion: Clip, finished: Clip
+) -> np.ndarray:
+    """(F, J) codes."""
+    missing = ~(known.rotation & known.translation)
+    codes = np.where(missing, Provenance.METHOD, Provenance.OBSERVED).astype(np.int8)
+    # A quaternion and its negative are the same rotation.
+    same = np.abs((rotations.normalize(opinion.rotation) * finished.rotation).sum(-1)) > 1 - 1e-12
+    columns = list(finished.translated)
+    same[:, columns] &= np.abs(opinion.translation - finished.translation).max(-1) < 1e-6
+    codes[missing & ~same] = Provenance.CORRECTED
+    for span in spans:
+        if span.method != method:
+            codes[span.start : span.stop][missing[span.start : span.stop]] = Provenance.FALLBACK
+    return codes
+
+
+def slides(clip: Clip, known: Observation, span: Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:
+    """Slide and travel of the feet in the gaps of a span, for skeletons that have feet."""
+    lo, hi, _ = span.around(len(clip), round(feet.NEARBY * clip.fps))
+    inside = [gap for gap in gaps if span.start <= gap.start and gap.stop <= span.stop]
+    ranges = [(gap.start - lo, gap.stop - lo) for gap in inside]
+    return dict(zip(inside, feet.measure_all(clip.slice(lo, hi), known.slice(lo, hi), ranges)))
+
+
+def _drift(notes: dict[str, Any], gap: Gap) -> float | None:
+    """`notes["drift"]`: metres, one number or one for each gap under its "start:stop"."""
+    drift = notes.get("drift")
+    if isinstance(drift, dict):
+        drift = drift.get(f"{gap.start}:{gap.stop}")
+    return None if drift is None else float(drift)
+
+
+def _centi(metres: float | None) -> float | None:
+    return None if metres is None else 100.0 * metres
