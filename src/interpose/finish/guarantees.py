@@ -105,7 +105,7 @@ class _Work:
         if not self.layer:
             opinion = carried(opinion, hidden, known)
             if self.raw.positions is None:
-                opinion = anatomy.straightened(opinion, known)
+                opinion = anatomy.unspun(anatomy.straightened(opinion, known), known)
                 self.firm = anatomy.locked(hidden, known)
                 opinion = merge(opinion, hidden, self.firm)
         self.opinion = held(opinion, self.clip.source)

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.geometry import rotations
 from interpose.methods import registry, weights
 from interpose.methods.protocol import Method
 from interpose.observation import Gap
-from interpose.skeletons.carrier import hips_of
 
-UP = np.array([0.0, 1.0, 0.0])
 # Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
 # keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.6 and
 # 7.4 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
@@ -25,23 +20,18 @@ NETWORKS, KEYS = ("small", "cae", "small-open"), ("small", "cmib", "small-open")
 # frames joints are off by .25 and .36 cm, the spline's by .43 and .69 (at the beginning .44 and .66, .59 and
 # .96); `cae` and `small-open` are not.
 AT_ENDS = ("small",)
-# Degrees between two lone keys about the vertical from which on `small`, which sees no way round, takes half
-# a turn in six frames (600 degrees a second), and `cmib` goes round in the time there is (250).
-HALF_TURN = 160.0
 
 
-def choose(clip: Clip, gap: Gap, lone: int = 0, turns: float = 0.0) -> tuple[Method, str | None]:
+def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
     """The method that measured best on validation performers for gaps of this length.
 
     A network from its length on, unless it refuses: then the next best one. Joints that are missing on their
     own go to networks at any length, as do gaps between two single keys (`lone` is 2), as nothing tells how
     fast anything moves there, and to AT_ENDS those at an end of the clip. The spline else, and where no
-    weights are installed; then with the reason why no network fills a gap that would be its own. `turns` is
-    by how many degrees the body turns from one lone key to the other.
+    weights are installed; then with the reason why no network fills a gap that would be its own.
     """
     why, short, at_end = None, False, gap.start == 0 or gap.stop == len(clip)
-    keys = (KEYS[1], KEYS[0], *KEYS[2:]) if turns > HALF_TURN else KEYS
-    for name in keys if gap.joints is None and lone == 2 else NETWORKS:
+    for name in KEYS if gap.joints is None and lone == 2 else NETWORKS:
         try:
             card = weights.find(name)
         except RequestError as error:
@@ -60,18 +50,8 @@ def choose(clip: Clip, gap: Gap, lone: int = 0, turns: float = 0.0) -> tuple[Met
     return registry.get("spline"), None if short else why
 
 
-def turns(clip: Clip, gap: Gap) -> float:
-    """Degrees about the vertical from the pose before a gap to the one after it."""
-    hips = hips_of(clip.skeleton)
-    ends = clip.slice(gap.start - 1, gap.start), clip.slice(gap.stop, gap.stop + 1)
-    before, after = (end.kinematics()[0][0, hips] for end in ends)
-    turned = rotations.multiply(after, rotations.conjugate(before))
-    return float(np.degrees(rotations.angle(rotations.twist_about(turned, UP), rotations.identity())))
-
-
-def choose_told(clip: Clip, gap: Gap, turns: float, action: str) -> Method:
-    """The method that is told the action: `small`, or `cmib` for half a turn between lone keys (`turns` as in
-    `choose`); the other one where it refuses or does not know the action.
+def choose_told(clip: Clip, gap: Gap, action: str) -> Method:
+    """The method that is told the action: `small`, and `cmib` where it refuses or does not know the action.
 
     Measured on LAFAN1's validation performer, in gaps of 30 and 60 frames: amid motion joints are off by 3.9
     and 9.8 cm with `small` and 7.5 and 16.7 with `cmib`; between two keys by 6.4 and 15.9, and 7.5 and 16.7.
@@ -82,7 +62,7 @@ def choose_told(clip: Clip, gap: Gap, turns: float, action: str) -> Method:
     Raises RequestError for an action that none of them knows, or where none is installed.
     """
     methods: list[Method] = []
-    for name in ("cmib", "small") if turns > HALF_TURN else ("small", "cmib"):
+    for name in ("small", "cmib"):
         try:
             methods.append(registry.told(name, action))
         except RequestError as error:
@@ -94,7 +74,7 @@ def choose_told(clip: Clip, gap: Gap, turns: float, action: str) -> Method:
 
 def instead(chosen: Method, clip: Clip, gap: Gap) -> Method:
     """What takes over where a method's motion is none of a person's: the spline, and for `cmib`, whose gaps
-    are long, between keys, and half a turn wide, `small`."""
+    are long, between keys, `small`."""
     try:
         other = registry.get(KEYS[0]) if chosen.name == KEYS[1] and weights.find(KEYS[0]) else None
     except RequestError:

@@ -53,7 +53,7 @@ def plan(
         open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
         name, note = methods.get(number, method), None
         if name == "auto" and action:
-            chosen = auto.choose_told(clip, lead, _turned(clip, observation, gap), action)
+            chosen = auto.choose_told(clip, lead, action)
         elif name == "auto":
             chosen, note = _suited(clip, observation, gap, lead)
         else:
@@ -68,17 +68,12 @@ def plan(
     return jobs
 
 
-def _turned(clip: Clip, observation: Observation, gap: Gap) -> float:
-    """By how many degrees the body turns from one lone key to the other; 0 where there are not two."""
-    return auto.turns(clip, gap) if _lone(observation, gap) == 2 and gap.joints is None else 0.0
-
-
 def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[Method, str | None]:
     """The method that `auto` takes for a gap, and why no network, where one would be its own."""
     if observation.rotation[gap.start : gap.stop].all():
         # What the body stands on tells more of where it is than any method.
         return Spline(), None
-    chosen, note = auto.choose(clip, lead, _lone(observation, gap), _turned(clip, observation, gap))
+    chosen, note = auto.choose(clip, lead, _lone(observation, gap))
     if isinstance(chosen, Spline) and note is None and (parted := _parted(observation, clip, gap)):
         # Too short for a network alone, amid joints that are lost for longer.
         return auto.choose(clip, parted)
