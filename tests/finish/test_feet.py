@@ -113,16 +113,34 @@ def test_reach_never_stretches_and_keeps_the_foot(walk):
     assert cosine.min() > 0.9999
 
 
-def test_floors_need_not_be_flat():
-    """A step up inside the gap: each side has the height of its own stances."""
-    height = np.where(np.arange(120) < 60, 0.1, 0.4)
-    positions = np.stack([np.zeros(120), height, np.zeros(120)], -1)[:, None, None]
-    known = np.ones((120, 1, 1), bool)
+@pytest.mark.parametrize("up", [True, False])
+def test_floors_need_not_be_flat(up):
+    """A step inside the gap, wherever it is, and a slope; a foot above them rests on one of the sides."""
+    step = np.where(np.arange(120) < 70, 0.1, 0.4)
+    slope = np.interp(np.arange(120), [39, 80], [0.1, 0.4])
+    above = step + 0.2 * np.sin(np.linspace(0, np.pi, 120))
+    heights = np.stack([step, slope, above], axis=1)[:: 1 if up else -1]
+    positions = np.stack([np.zeros_like(heights), heights, np.zeros_like(heights)], -1)[:, :, None]
+    known = np.ones((120, 3, 1), bool)
     known[40:80] = False
-    floor = feet.local_floor(positions, known, 30.0)[:, 0, 0]
-    assert floor[0] == pytest.approx(0.1)
-    assert floor[119] == pytest.approx(0.4)
-    assert 0.1 < floor[60] < 0.4
+    floor = feet.local_floor(positions, known, 30.0)[..., 0]
+    np.testing.assert_allclose(floor[:, :2], heights[:, :2], atol=0.02)
+    assert (floor[40:80, 2] <= heights[40:80, 2] + 0.021).all()
+    assert set(np.round(floor[[0, 119], 2], 1)) == {0.1, 0.4}
+
+
+def test_nobody_stands_on_air_beside_a_step(walk):
+    """Feet that the motion puts on the ground before a step of 40 cm are not lifted half way to it."""
+    raised = walk.translation.copy()
+    half = len(walk) // 2
+    raised[half:, 0, 1] += 0.4
+    clip = walk.with_motion(walk.rotation, raised)
+    known = Observation.from_gaps(clip, [Gap(half - 20, half + 20)])
+    held = feet.plant(clip, known, (half - 20, half + 20))
+    joints = feet.pairs(clip.skeleton).ravel()
+    off = held.positions()[:, joints, 1] - clip.positions()[:, joints, 1]
+    assert np.abs(off[: half - 5]).max() < 0.05
+    assert np.abs(off[half + 5 :]).max() < 0.05
 
 
 @pytest.mark.parametrize("shown", [10, 1])

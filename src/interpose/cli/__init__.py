@@ -1,16 +1,19 @@
 """The command line: one file a verb, thin (parse, call, print). Nothing heavy is imported before it is used.
 
 Exit codes: 0 done, 1 a fault of the program, 2 wrong usage, 3 unreadable input, 4 something left unfilled,
-130 interrupted.
+130 interrupted, 143 terminated.
 """
 
 from __future__ import annotations
 
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
 from collections.abc import Sequence
+from types import FrameType
 
 from interpose import __version__
 from interpose.errors import Fault, FileError, InterposeError
@@ -77,6 +80,11 @@ def main(tokens: Sequence[str] | None = None) -> int:
     tokens = list(sys.argv[1:] if tokens is None else tokens)
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
+    if (
+        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        and threading.current_thread() is threading.main_thread()
+    ):
+        signal.signal(signal.SIGTERM, _terminated)
     try:
         code = _run(tokens, debug)
         sys.stdout.flush()
@@ -98,6 +106,11 @@ def main(tokens: Sequence[str] | None = None) -> int:
         told = foreseen(error)
         _complain(told)
         return told.exit_code
+
+
+def _terminated(number: int, frame: FrameType | None) -> None:
+    """End as one does who cleans up: what is half written is deleted."""
+    raise SystemExit(128 + number)
 
 
 def foreseen(error: Exception) -> InterposeError:

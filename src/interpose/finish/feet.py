@@ -40,6 +40,8 @@ LIKELY = 0.5
 LEAP = 1.5
 # The share of its length at which a leg begins to be straight.
 TAUT = 0.97
+# Metres by which a foot may be under what it rests on.
+STEP_UP = 0.02
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -92,12 +94,13 @@ def pairs(skeleton: Skeleton) -> np.ndarray:
 
 
 def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
-    """(F, L, 2) the height at which each ankle and toe rests: of observed stances, interpolated over what is
-    missing.
+    """(F, L, 2) the height at which each ankle and toe rests, or would: of observed stances beside a gap.
 
     On each side of a gap the low end of the heights of the joint while it is slow, within two seconds. One
     that is always on its way there rests where the same joint of another foot does, or, when none of them
-    stands, where the lowest of them is: what is known may be a single pose with a foot in the air.
+    stands, where the lowest of them is: what is known may be a single pose with a foot in the air. Where the
+    sides differ, there are stairs or a slope between them: a joint rests on the highest of both, and of what
+    lies in a straight line between them, that is not above it by more than STEP_UP.
 
     Args:
         feet: (F, L, 2, 3) ankles and toes of L legs.
@@ -116,14 +119,27 @@ def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
                 heights, seen, still = (some[part, :, end] for some in (feet[..., 1], known, slow))
                 at.append(side)
                 rests.append(_rest(heights, seen, still & seen, leg))
-        own = feet[:, leg, end, 1]
-        floor[:, leg, end] = np.interp(np.arange(len(feet)), at, rests) if at else np.percentile(own, 5)
+        floor[:, leg, end] = _below(feet[:, leg, end, 1], np.array(at), np.array(rests))
     # What is never observed rests where the same joint of another foot does.
     told = np.asarray(known.any(axis=0))
     for leg, end in np.ndindex(told.shape):
         if told[:, end].any() and not told[leg, end]:
             floor[:, leg, end] = floor[:, int(np.argmax(told[:, end])), end]
     return floor
+
+
+def _below(heights: np.ndarray, at: np.ndarray, rests: np.ndarray) -> np.ndarray:
+    """(F,) on what a joint at `heights` (F,) rests, by where it rests, `rests` (n,), in frames `at` (n,)."""
+    if not at.size:
+        return np.full(len(heights), np.percentile(heights, 5))
+    frames = np.arange(len(heights))
+    sides = [
+        rests[np.clip(np.searchsorted(at, frames, side) - (side == "right"), 0, len(at) - 1)]
+        for side in ("right", "left")
+    ]
+    levels = np.array([*sides, np.interp(frames, at, rests)])
+    reached = np.where(levels <= heights + STEP_UP, levels, -np.inf).max(axis=0)
+    return np.where(np.isfinite(reached), reached, levels.min(axis=0))
 
 
 def sunk(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int] | None:
