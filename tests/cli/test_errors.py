@@ -180,16 +180,25 @@ def test_debug_shows_where_an_error_comes_from(run, take, monkeypatch):
         assert done.err.endswith(plain.err)
 
 
-def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch):
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch, number, code):
+    """Where an interrupt raises KeyboardInterrupt, as in a terminal."""
+
     def interrupted(*args: object) -> None:
         args[1].write(b"half of it")  # type: ignore[attr-defined]
-        raise KeyboardInterrupt
+        signal.raise_signal(number)
+
+    before = [signal.signal(signal.SIGINT, signal.default_int_handler), signal.getsignal(signal.SIGTERM)]
 
     from interpose.formats import FORMATS
 
     monkeypatch.setitem(FORMATS, ".bvh", FORMATS[".bvh"]._replace(write=interrupted))
-    done = run("fill", "take.bvh", "--gap", "60:80", "--method", "linear")
-    assert done.code == 130
+    try:
+        done = run("fill", "take.bvh", "--gap", "60:80", "--method", "linear")
+    finally:
+        for one, handler in zip((signal.SIGINT, signal.SIGTERM), before):
+            signal.signal(one, handler)
+    assert done.code == code
     assert done.err == ""
     assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
 

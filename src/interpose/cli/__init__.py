@@ -75,16 +75,16 @@ def root_help() -> str:
     return HELP.format(verbs="\n".join(groups))
 
 
+class _Terminated(BaseException):
+    """Somebody wants this process to end; what is half written is deleted on the way out."""
+
+
 def main(tokens: Sequence[str] | None = None) -> int:
     """Run the command line `tokens` (default: the program's arguments); returns the exit code."""
     tokens = list(sys.argv[1:] if tokens is None else tokens)
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
-    if (
-        signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-        and threading.current_thread() is threading.main_thread()
-    ):
-        signal.signal(signal.SIGTERM, _terminated)
+    _heed_termination()
     try:
         code = _run(tokens, debug)
         sys.stdout.flush()
@@ -96,6 +96,8 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         return 130
+    except _Terminated:
+        return 143
     except BrokenPipeError:
         # Who read our output has had enough. The interpreter flushes once more when it ends.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -108,9 +110,14 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return told.exit_code
 
 
-def _terminated(number: int, frame: FrameType | None) -> None:
-    """End as one does who cleans up: what is half written is deleted."""
-    raise SystemExit(128 + number)
+def _heed_termination() -> None:
+    def end(number: int, frame: FrameType | None) -> None:
+        raise _Terminated
+
+    # Signals are for the main thread, and who embeds this program may have a mind of their own.
+    main = threading.current_thread() is threading.main_thread()
+    if main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
+        signal.signal(signal.SIGTERM, end)
 
 
 def foreseen(error: Exception) -> InterposeError:
