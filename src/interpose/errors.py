@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 
 class InterposeError(ValueError):
     """One line what, one line why, one line what to do.
@@ -60,3 +62,8 @@ def unknown(kind: str, name: object, choices: object) -> RequestError:
         f"it is none of: {', '.join(names)}",
         f"{hint}Choose one of the names above.",
     )
+
+
+def few(names: Sequence[str], most: int = 4) -> str:
+    """Names in a sentence, the first of many."""
+    return ", ".join(names[:most]) + f" +{len(names) - most}" * (len(names) > most)

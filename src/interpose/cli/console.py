@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from interpose.errors import InterposeError
+from interpose.errors import InterposeError, few
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -79,10 +79,7 @@ def seconds(frames: int, fps: float) -> str:
 
 def names(joints: Sequence[str] | None, most: int = 4) -> str:
     """Joint names, the first few of many; the whole pose for None."""
-    if joints is None:
-        return "all"
-    shown = ", ".join(joints[:most])
-    return shown + (f" +{len(joints) - most}" if len(joints) > most else "")
+    return "all" if joints is None else few(joints, most)
 
 
 def figure(value: float | None, digits: int = 2) -> str:

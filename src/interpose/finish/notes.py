@@ -8,6 +8,7 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
+from interpose.errors import few
 from interpose.finish import anatomy, feet, floor, measures, seams
 from interpose.finish.windows import grow
 from interpose.geometry.time import runs
@@ -253,10 +254,9 @@ def rests(joints: list[str], method: str) -> list[str]:
     """A note where nothing of some joints is `never` known."""
     if not joints:
         return []
-    named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
     return [
-        f"flagged: nothing of {named} is known at any frame, and {method} has only the rest pose to say. "
-        "--method cae tells it from the other joints"
+        f"flagged: nothing of {few(joints)} is known at any frame, and {method} has only the rest pose to "
+        "say. --method cae tells it from the other joints"
     ]
 
 

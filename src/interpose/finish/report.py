@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.errors import few
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap
 
@@ -87,7 +88,7 @@ class GapReport:
     def __str__(self) -> str:
         where = f"{self.start}:{self.stop}"
         if self.joints is not None:
-            where += " " + ",".join(self.joints[:4]) + (",..." if len(self.joints) > 4 else "")
+            where += f" {few(self.joints)}"
         named = self.model and self.model != self.method
         parts = [f"by {self.method}" + (f" ({self.model})" if named else "")]
         if self.solve_error is not None:
@@ -156,7 +157,7 @@ class NoiseReport:
         furthest = max(self.joints, key=lambda one: one.moved_most)
         twisted = max(self.joints, key=lambda one: one.turned_most)
         lossy = [one.joint for one in self.joints if one.broken]
-        where = f", in {', '.join(lossy[:4])}" + f" +{len(lossy) - 4}" * (len(lossy) > 4) if lossy else ""
+        where = f", in {few(lossy)}" if lossy else ""
         return "\n".join(
             [
                 f"noise: {self.noise:.2f} cm along each axis, estimated (most: {shakiest.joint}, "
@@ -207,8 +208,7 @@ class Report:
         if not self.moments:
             return ""
         count, joints = sum(len(one.frames) for one in self.moments), [one.joint for one in self.moments]
-        named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
-        return f"lost for moments and interpolated: {count} time{'s' * (count != 1)}, of {named}"
+        return f"lost for moments and interpolated: {count} time{'s' * (count != 1)}, of {few(joints)}"
 
     @property
     def sides(self) -> str:
@@ -219,8 +219,8 @@ class Report:
         frames = sorted(
             {at for one in self.exchanged for at in one.frames}, key=lambda at: int(at.split(":")[0])
         )
-        named = ", ".join(joints[:4]) + f" +{len(joints) - 4}" * (len(joints) > 4)
-        return f"taken for the other side, or for half a turn, and put back: {named}, in {', '.join(frames)}"
+        what = f"{few(joints)}, in {', '.join(frames)}"
+        return f"taken for the other side, or for half a turn, and put back: {what}"
 
     def __str__(self) -> str:
         if self.noise is not None:

@@ -23,10 +23,9 @@ from interpose.methods.bodies import no_humanoid, observed_body, on_the_floor
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import ACROSS, ACROSS_TURN, JOINTS, PARENTS, SIDES, Mapping, find_mapping
+from interpose.skeletons import ACROSS, ACROSS_TURN, FEET, PARENTS, SIDES, Mapping, find_mapping
 from interpose.skeletons.mirror import mirrored
 
-FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
 FEET_ACROSS = [FEET.index(SIDES[foot]) for foot in FEET]
 AGREE = np.pi / 2  # how far a motion and its mirror image may be apart, in any joint
 CONTEXT = 10  # frames on both sides of a hole that are seen, as in training

@@ -23,11 +23,10 @@ from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
 from interpose.geometry.ground import FLOOR
 from interpose.models.keys import neighbours, pick
-from interpose.skeletons import JOINTS, PARENTS
+from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.skeletons.body import facing
 
 COUNT = len(JOINTS)
-FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
 SECOND = 30.0  # frames
 VELOCITY = 10.0  # what velocities (m or matrix entries a frame) are multiplied with, to be about 1
 # Frames that velocities reach, of rotations and of the hips: near what is best for the starting point alone,

@@ -16,6 +16,9 @@ JOINTS = (
 )
 PARENTS = (-1, 0, 1, 2, 3, 0, 5, 6, 7, 0, 9, 10, 11, 12, 11, 14, 15, 16, 11, 18, 19, 20)
 
+# Ankles and toes: what a body stands on.
+FEET = tuple(JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Foot", "Toe"))
+
 # The index of each joint's mirror image.
 SIDES = tuple(
     JOINTS.index("Right" + n[4:] if n.startswith("Left") else "Left" + n[5:] if n.startswith("Right") else n)

@@ -21,9 +21,9 @@ from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
 from interpose.methods.weights import Card
-from interpose.models.base import CONFIGS, COUNT, FEET, Answer, Base, BaseConfig, Motion
+from interpose.models.base import CONFIGS, COUNT, Answer, Base, BaseConfig, Motion
 from interpose.observation.corruption import LIMBS
-from interpose.skeletons import JOINTS, PARENTS
+from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
 from interpose.training.loop import Settings, Trainer, restore
