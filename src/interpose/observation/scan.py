@@ -109,55 +109,58 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
     data to be filled from.
     """
-    findings: list[Finding] = []
     known = observation or Observation.full(clip)
     known.check(clip)
-    for gap in known.gaps(clip.skeleton):
-        findings.append(Finding("missing", gap.joints, gap.start, gap.stop, "no values"))
+    gaps = known.gaps(clip.skeleton)
+    findings = [Finding("missing", gap.joints, gap.start, gap.stop, "no values") for gap in gaps]
     if len(clip) > 2:
-        turned, moved = _steps(clip, known)
-        first, last = 0, len(clip)
-        for stray in _strays(clip, turned):
-            findings.append(stray)
-            first, last = (1, last) if stray.start == 0 else (first, last - 1)
-        turned, moved = turned[first : last - 1], moved[first : last - 1]
-        findings += _frozen(clip, turned, moved, first)
-        findings += _dead(clip, turned)
-        findings += _held_place(clip, findings)
-        swapped, names = exchanges(clip), clip.skeleton.names
-        findings += [
-            Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
-            for one in swapped
-        ]
-        clip = put_back(clip, swapped)
-        stiff = _stiff(clip, [one for one in findings if one.kind not in NO_GAPS])
-        for whole in [one for one in stiff if one.joints is None]:
-            # The place is held as all else is.
-            findings = [
-                one
-                for one in findings
-                if one.kind != "frozen position"
-                or one.start < whole.start - MANY
-                or one.stop > whole.stop + MANY
-            ]
-        findings += stiff
-        repeated = _repeated(turned, moved, first, clip.fps)
-        for again in repeated:
-            # What stands still for a moment, again and again, is that.
-            brief, near = round(HOLDS * clip.fps), (again.start - 1, again.stop + 1)
-            findings = [
-                one
-                for one in findings
-                if one.kind not in ("frozen", "still")
-                or len(one) > brief
-                or one.stop < near[0]
-                or one.start > near[1]
-            ]
-        findings += repeated + _lost(clip, findings)
-        if not repeated:
-            findings += _jumps(clip, known, findings)
-            findings += _noisy(clip, known)
+        findings = _looked_at(clip, known, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
+
+
+def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
+    """`findings`, and what the values themselves tell: each look leaves out what an earlier one explains."""
+    turned, moved = _steps(clip, known)
+    findings = findings + (outliers := _strays(clip, turned))
+    odd = {stray.start for stray in outliers}
+    first, last = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
+    turned, moved = turned[first : last - 1], moved[first : last - 1]
+    findings += _frozen(clip, turned, moved, first)
+    findings += _dead(clip, turned)
+    findings += _held_place(clip, findings)
+    swapped, names = exchanges(clip), clip.skeleton.names
+    findings += [
+        Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
+        for one in swapped
+    ]
+    clip = put_back(clip, swapped)
+    stiff = _stiff(clip, [one for one in findings if one.kind not in NO_GAPS])
+    for whole in [one for one in stiff if one.joints is None]:
+        # The place is held as all else is.
+        within = range(whole.start - MANY, whole.stop + MANY + 1)
+        findings = [
+            one
+            for one in findings
+            if one.kind != "frozen position" or one.start not in within or one.stop not in within
+        ]
+    findings += stiff
+    repeated, brief = _repeated(turned, moved, first, clip.fps), round(HOLDS * clip.fps)
+    for again in repeated:
+        # What stands still for a moment, again and again, is that.
+        findings = [
+            one
+            for one in findings
+            if one.kind not in ("frozen", "still")
+            or len(one) > brief
+            or one.stop < again.start - 1
+            or one.start > again.stop + 1
+        ]
+    findings += repeated
+    findings += _lost(clip, findings)
+    if not repeated:
+        findings += _jumps(clip, known, findings)
+        findings += _noisy(clip, known)
+    return findings
 
 
 def strays(clip: Clip) -> list[int]:
