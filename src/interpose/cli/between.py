@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.console import progress
@@ -16,8 +15,6 @@ from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
-
-FASTEST = 20.0  # metres a second: no hand goes so fast
 
 
 def between(
@@ -118,21 +115,17 @@ def between(
 def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
 ) -> tuple[Path, list[int], Clip, str, dict[Path, bool]]:
-    """A clip that holds poses of several files at its keys, and before the first and after the last one what
-    these files hold there, as it tells how the body moves: the file it begins with, the keys, the clip, lines
-    for the user, and the other files, each with whether it is of another rig."""
-    from interpose import tasks
+    """A clip that holds poses of several files at its keys, as `tasks.blocking` makes it: the file it begins
+    with, the keys, the clip, lines for the user, and the other files, each with whether it is of another rig.
+    """
     from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
-    from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
-    from interpose.skeletons.carrier import hips_of
+    from interpose.tasks.blocking import blocked, posed
 
     met_at = [_met(text) for text in anchors]
     named = [_named(text) for text in (start, target, *(what for what, _ in met_at))]
-    file = named[0][0]
     loaded = reading.load_all([path for path, _ in named])
-    before = loaded[0]
-    clips = [before, *(on_rig_of(clip, before) for clip in loaded[1:])]
+    clips = [loaded[0], *(on_rig_of(clip, loaded[0]) for clip in loaded[1:])]
     others = {path: clip is not own for (path, _), clip, own in zip(named[1:], clips[1:], loaded[1:])}
     said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
     at = []
@@ -144,59 +137,14 @@ def _blocked(
                 f"frame {odd} of {path} has nothing to do with the one beside: frame {number} is taken"
             )
         at.append(number)
-    last, after, first = at[0], clips[1], at[1]
-    held = _frame_of(before, last)
-    poses = {0: held}
-    for (_, when), clip, frame in zip(met_at, clips[2:], at[2:]):
-        poses[when] = fit(_frame_of(clip, frame), held)[0]
-    met, end = max(poses), fit(_frame_of(after, first), held)[0]
-    beside = fit(after, before)[0]
-    moment = min(round(first * before.fps / after.fps), len(beside) - 1)
-    if frames == "auto":
-        # On to the target from the last pose before it; when anchors are met was said.
-        here = (poses[met], 0) if met else (before, last)
-        count, why = plausible_length(*here, beside, moment)
-        count += met
-        later = f" after the anchor at {met}" if met else ""
-        said.append(f"{count} frame{'s' * (count > 1)}: {why}{later}")
-    elif frames.isdecimal() and int(frames) > 0:
-        count = int(frames)
-    else:
+    if frames != "auto" and not (frames.isdecimal() and int(frames) > 0):
         raise RequestError(
             f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
         )
-    bounded(count, before.fps)
-    if met > count:
-        why = f"--target is frame {count + 1}"
-        raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {count}.")
-    poses[count + 1] = end
-    near, blocked = round(tasks.BESIDE * before.fps), tasks.block(poses)
-    # Rest poses and the like at the ends of files tell nothing of how it moves.
-    since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
-    until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
-    # Nor does another pose beside one that is blocked.
-    since = since if since < last and _goes_on(before.slice(last - 1, last + 1)) else last
-    until = until if until > moment + 1 and _goes_on(beside.slice(moment, moment + 2)) else moment + 1
-    # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
-    laid, lay = (
-        hips[0, hips_of(held.skeleton)]
-        for hips in (end.positions(), beside.slice(moment, moment + 1).positions())
-    )
-    shift = (float(laid[0] - lay[0]), 0.0, float(laid[2] - lay[2]))
-    on = Placement(shift=shift).of(beside.slice(moment + 1, until))
-    parts = [before.slice(since, last), blocked, on]
-    return (
-        file,
-        [len(parts[0]) + key for key in sorted(poses)],
-        joined(blocked, parts),
-        "\n".join(said),
-        others,
-    )
-
-
-def _goes_on(clip: Clip) -> bool:
-    """Whether a body may have moved so from the one frame of a clip to the other."""
-    return bool(np.linalg.norm(np.diff(clip.positions(), axis=0), axis=-1).max() * clip.fps < FASTEST)
+    met = {when: posed(clip, frame) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
+    count = None if frames == "auto" else int(frames)
+    done = blocked(clips[0], at[0], clips[1], at[1], met, count)
+    return named[0][0], done.keys, done.clip, "\n".join([*said, *done.said]), others
 
 
 def _met(text: str) -> tuple[str, int]:
@@ -221,9 +169,3 @@ def _moment(path: Path, frame: int | None, clip: Clip, usual: int) -> int:
         why = f"the clip has {len(clip)} frames, counted from 0"
         raise RequestError(f"there is no frame {number} in {path}", why, f"Choose up to {len(clip) - 1}.")
     return number
-
-
-def _frame_of(clip: Clip, frame: int) -> Clip:
-    """One frame, with the file's layout."""
-    part = slice(frame, frame + 1)
-    return clip.with_motion(clip.rotation[part], clip.translation[part])

@@ -5,10 +5,9 @@ from interpose.tasks.forecasting import Forecast, forecast
 from interpose.tasks.keys import between, block
 from interpose.tasks.planning import plan
 from interpose.tasks.recovering import denoise, recover
-from interpose.tasks.stitching import BESIDE, Stitched, stitch
+from interpose.tasks.stitching import Stitched, stitch
 
 __all__ = [
-    "BESIDE",
     "Forecast",
     "Stitched",
     "between",
