@@ -154,3 +154,16 @@ def test_one_clip_goes_into_a_folder_too(run, takes):
     (takes / "done").mkdir()
     assert run("fill", "takes/b.bvh", "--gap", "60:80", "--method", "spline", "-o", "takes/done").code == 0
     assert (takes / "done" / "b.bvh").exists()
+
+
+def test_a_dry_run_knows_that_the_folder_will_be_made(run, take):
+    """And makes none."""
+    folder = take.parent / "takes"
+    folder.mkdir()
+    for name in ("a.bvh", "b.bvh"):
+        (folder / name).write_bytes(take.read_bytes())
+    done = run("fill", "takes", "--gap", "20:30", "-o", "new", "--dry-run")
+    assert done.code == 0
+    assert "That would end with" not in done.out
+    assert not (take.parent / "new").exists()
+    assert run("fill", "take.bvh", "--gap", "20:30", "-o", "new/x.bvh", "--dry-run").code == 2

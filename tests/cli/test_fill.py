@@ -195,7 +195,11 @@ def test_a_dry_run_writes_nothing(run, take):
     assert "longer than --max-gap 40" in done.out
     assert "take.filled.html" in done.out
     (take.parent / "take.filled.bvh").write_text("mine")
-    assert "--force" in run("fill", "take.bvh", "--gap", "20:30", "--dry-run").out
+    there = run("fill", "take.bvh", "--gap", "20:30", "--dry-run")
+    assert "--force" in there.out
+    assert there.code == 2
+    nowhere = run("fill", "take.bvh", "--gap", "20:30", "-o", "new")
+    assert "Or make the folder new first" in nowhere.err
     planned = run("fill", "take.bvh", "--gap", "20:30", "--method", "linear", "--dry-run", "--json").json
     assert planned["would_fill"] == [{"number": 1, "frames": "20:30", "joints": None, "method": "linear"}]
 

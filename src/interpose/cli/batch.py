@@ -14,7 +14,7 @@ from typing import Any
 
 from interpose.cli import foreseen
 from interpose.cli.console import complain, console, say, say_json
-from interpose.cli.outputs import MADE
+from interpose.cli.outputs import FOLDERS_MADE, MADE
 from interpose.errors import FileError, NothingError, RequestError
 
 MOTION = (".bvh", ".npz", ".amc")
@@ -50,7 +50,7 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
             _apart([(path, place if folder is not None else path) for path, place in found.values()])
         codes, reports = [], []
         for path, place in found.values():
-            said = StringIO()
+            said, made = StringIO(), FOLDERS_MADE.set(bool(options.get("dry_run")))
             try:
                 if path.is_dir():
                     raise _empty(path)
@@ -76,6 +76,8 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 reports.append({"input": str(path), **said_of})
                 complain(told)
                 codes.append(told.exit_code)
+            finally:
+                FOLDERS_MADE.reset(made)
             if not options.get("json"):
                 say()
         if options.get("json"):

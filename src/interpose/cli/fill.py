@@ -205,7 +205,11 @@ def _dry_run(
     seen = replace(seen, pins=tuple(pins))
     spans(clip, seen, points)
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
-    code = 4 if request.left or any(job.method is None for job in jobs) else 0
+    code, ends = 4 if request.left or any(job.method is None for job in jobs) else 0, ""
+    try:
+        outputs.check(file, force, gaps)
+    except RequestError as error:
+        code, ends = error.exit_code, f"{error.what}; {error.why}. {error.fix}"
     if as_json:
         planned = [
             {
@@ -217,7 +221,7 @@ def _dry_run(
             for job in jobs
         ]
         files = [str(path) for path in outputs.all]
-        more = {"path": request.path, "pinned": request.pins, "left": request.left}
+        more = {"path": request.path, "pinned": request.pins, "left": request.left, "would_end_with": ends}
         more = {name: value for name, value in more.items() if value}
         say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files, **more})
         return code
@@ -244,8 +248,6 @@ def _dry_run(
             say(f"{what}: {'  '.join(told)}")
     say()
     say(outputs.told(dry_run=True))
-    try:
-        outputs.check(file, force, gaps)
-    except RequestError as error:
-        say(f"That would end with: {error.what}; {error.why}. {error.fix}")
+    if ends:
+        say(f"That would end with: {ends}")
     return code

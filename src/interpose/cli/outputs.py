@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextvars import ContextVar
 from dataclasses import dataclass
 from json import dumps, loads
 from pathlib import Path
@@ -45,6 +46,9 @@ UNITS = {
 # What verbs call what they make of take.bvh: take.filled.bvh and so on.
 MADE = ("between", "denoised", "filled", "forecast", "recovered", "stitched")
 
+# Whether a folder that is not there yet will be: a dry run of many clips makes none.
+FOLDERS_MADE: ContextVar[bool] = ContextVar("FOLDERS_MADE", default=False)
+
 
 @dataclass(frozen=True)
 class Outputs:
@@ -80,10 +84,11 @@ class Outputs:
         from interpose.formats import FORMATS
 
         if self.clip.suffix.lower() not in FORMATS:
+            folder = f" Or make the folder {self.clip} first." if not self.clip.suffix else ""
             raise RequestError(
                 f"cannot write {self.clip}",
                 f"the suffix {self.clip.suffix or '(none)'} names no format",
-                f"Supported are {', '.join(FORMATS)}.",
+                f"Supported are {', '.join(FORMATS)}.{folder}",
             )
         for path in self.all:
             what = f"cannot write {path}"
@@ -93,7 +98,7 @@ class Outputs:
                 )
             if path.is_dir():
                 raise RequestError(what, "it is a directory", "Name a file in it with -o.")
-            if not path.parent.is_dir():
+            if not (path.parent.is_dir() or FOLDERS_MADE.get()):
                 raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
             if path == self.report and path.exists() and not is_report(read_json(path)):
                 read = gaps is not None and gaps.exists() and path.samefile(gaps)
