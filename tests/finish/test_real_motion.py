@@ -91,6 +91,20 @@ def test_a_jump_inside_a_gap_is_mended_and_the_place_named(case, speaking):
     assert report.peak <= report.peak_limit
 
 
+def test_a_jump_between_lone_keys_is_mended_as_well(cmu_walk, speaking):
+    """Where nothing tells how the motion itself jumps: an eighth of a turn within a frame, by 140 m/s^2."""
+    from interpose.finish import complete
+
+    clip, time = cmu_walk.slice(60, 102), np.arange(42)
+    case = clip, Gap(1, 41), Observation.from_gaps(clip, [Gap(1, 41)]), None
+    share = np.where(time < 21, 0.0, 0.5 * np.clip((41 - time) / 20, 0, 1))
+    method = turning(speaking, case, share)
+    (report,) = complete(clip, case[2], method).report.gaps
+    assert any("a spline leads over frames" in note for note in report.notes)
+    assert report.peak * clip.fps**2 / 100 < 100
+    assert not any("jumps at frame" in note for note in report.notes)
+
+
 def test_what_jumps_all_over_a_gap_falls_back_by_name(case, speaking):
     """It turns to and fro, from frame to frame."""
     from interpose.finish import complete

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import seams
+from interpose.finish import feet, seams
 from interpose.finish.span import Span, write
 from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
@@ -18,11 +18,14 @@ from interpose.observation import Gap, Observation
 # Metres a second squared by which velocities may jump inside of any gap: toes of who walks do by 48, and
 # beside a gap he may have stood.
 SETS_OFF = 60.0
-# Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do; the
-# share of a gap beyond which that is no mending; and the jump (metres a second squared) that is mended even
-# where nothing tells how the motion itself jumps. Between poses that face away from each other networks may
-# turn all at once.
-MENDS, PATCHED, TORN = (0.1, 0.2, 0.4), 0.5, 200.0
+# Seconds on either side of a jump inside of a gap that a spline takes over to mend it, as few as do, and the
+# share of a gap beyond which that is no mending.
+MENDS, PATCHED = (0.1, 0.2, 0.4), 0.5
+# Metres a second squared by which velocities jump in no body's motion; and by which they seldom do but where
+# feet land and hands strike: mended where nothing tells how the motion itself jumps. Between 60 pairs
+# of keys half a turn apart, where networks may turn all at once, 23 fills jump so, and 5 once it is mended
+# (joints are off by 24.6 and 24.5 cm); between 80 pairs of any 3, and 1.
+TORN, WILD = 200.0, 100.0
 # The change of velocity (metres a second) beyond which none is softened: that is a jump in value.
 KINK = 8.0
 
@@ -104,7 +107,7 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
 
     Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
     """
-    most = TORN / current.fps**2 if bounds is None else bounds.peak
+    most = WILD * feet.size(current.skeleton) / current.fps**2 if bounds is None else bounds.peak
     lo, hi, (start, stop) = span.around(len(current), 3)
     # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
     frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)

@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import few
-from interpose.finish import anatomy, feet, floor, measures, seams
+from interpose.finish import anatomy, feet, floor, jumps, measures, seams
 from interpose.finish.windows import grow
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -45,8 +45,6 @@ SKIDS, SLIDES = 3.0, 15.0
 # Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
 ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
-# Metres a second squared by which velocities jump where feet land and hands strike, and seldom else.
-WILD = 100.0
 
 
 def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
@@ -89,7 +87,7 @@ def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
         return []
     size = np.linalg.norm(seams.jumps(finished, known, frames), axis=-1) * finished.fps**2
     row, joint = np.unravel_index(int(size.argmax()), size.shape)
-    if size[row, joint] <= WILD * feet.size(finished.skeleton):
+    if size[row, joint] <= jumps.WILD * feet.size(finished.skeleton):
         return []
     where = f"{finished.skeleton.names[joint]} jumps at frame {first + int(frames[row])}"
     said = f"flagged: {where}, by {size[row, joint]:.0f} m/s^2"
