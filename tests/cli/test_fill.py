@@ -428,7 +428,7 @@ def test_npz_in_npz_out(run, take):
     assert "unit" not in json.loads(take.with_name("take.filled.json").read_text())
 
 
-def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data):
+def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data, monkeypatch):
     take.with_name("jump.bvh").write_bytes((data / "cmu_jump.bvh").read_bytes())
     words = ["fill", "take.bvh", "--gap", "60:90", "--joints", "RightArm,RightHand", "--method", "spline"]
     given = ["--from", "jump.bvh", "--from-range", "40:48", "--at", "70"]
@@ -442,6 +442,13 @@ def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data
     assert np.abs(first.rotation[70:78, arm] - jump.rotation[40:48, arm]).max() < 1e-5
     assert run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh").code == 0
     assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+    # From another folder: what the report names lies beside it.
+    elsewhere = take.parent / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert run("fill", take, "--gaps", take.with_name("take.filled.json"), "-o", "once_more.bvh").code == 0
+    assert (elsewhere / "once_more.bvh").read_bytes() == take.with_name("again.bvh").read_bytes()
+    monkeypatch.chdir(take.parent)
     assert run("fill", "take.bvh", "--gap", "60:90", *given, "-o", "x.bvh").err.startswith(
         "error: --from needs"
     )

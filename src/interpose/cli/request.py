@@ -328,6 +328,12 @@ def parts_to_dict(parts: list[Lent]) -> list[dict[str, Any]]:
     ]
 
 
+def _beside(report: Path, name: str) -> Path:
+    """The file that a report names, as it was named, or else from where the report lies."""
+    file = Path(name)
+    return file if file.exists() or not (near := report.parent / file).exists() else near
+
+
 def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, reading: Reading) -> Request:
     """The gaps of a report, filled and open ones as they were, each by the method named in it."""
     left = content["open"]
@@ -340,7 +346,9 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
     parts = [
         part
         for one in content.get("parts", [])
-        for part in part_of(Path(one["file"]), one["frames"], one["at"], one["joints"], clip, reading)
+        for part in part_of(
+            _beside(path, one["file"]), one["frames"], one["at"], one["joints"], clip, reading
+        )
     ]
     if content.get("layer"):
         filled += [Gap(p.at, p.at + p.stop - p.start, p.joints) for p in (one.part for one in parts)]
