@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+from pathlib import Path
 
 import pytest
 
@@ -167,3 +169,15 @@ def test_a_dry_run_knows_that_the_folder_will_be_made(run, take):
     assert "That would end with" not in done.out
     assert not (take.parent / "new").exists()
     assert run("fill", "take.bvh", "--gap", "20:30", "-o", "new/x.bvh", "--dry-run").code == 2
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_linked_folders_are_looked_into_once(run, take):
+    folder, kept = take.parent / "takes", take.parent / "kept"
+    for one in (folder, kept):
+        one.mkdir()
+    take.rename(kept / "a.bvh")
+    (folder / "linked").symlink_to(kept)
+    (kept / "round").symlink_to(folder)
+    done = run("scan", "takes", "--json")
+    assert [Path(one["input"]).parts for one in done.json] == [("takes", "linked", "a.bvh")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, redirect_stdout
@@ -124,7 +125,7 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
         if not path.is_dir():
             yield path, Path(path.name)
             continue
-        held = sorted(one for one in path.rglob("*") if one.suffix.lower() in MOTION and one.is_file())
+        held = sorted(one for one in _within(path) if one.suffix.lower() in MOTION and one.is_file())
         names, into = {*held}, output.resolve() if output is not None else None
         found = False
         for one in held:
@@ -135,3 +136,15 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
                 yield one, one.relative_to(path)
         if not found:
             yield path, Path(path.name)
+
+
+def _within(folder: Path) -> Iterator[Path]:
+    """The files in a folder and the folders in it, linked ones, too, each of them once."""
+    been = set()
+    for place, folders, files in os.walk(folder, followlinks=True):
+        if (real := os.path.realpath(place)) in been:
+            folders.clear()
+            continue
+        been.add(real)
+        folders.sort()
+        yield from (Path(place, name) for name in files)
