@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from interpose.clip import Clip
-from interpose.finish import complete, feet, measures
+from interpose.finish import complete, feet, measures, notes
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -238,3 +238,45 @@ def test_a_foot_does_not_leap_from_one_contact_to_the_next(cmu_walk):
     tied = feet.Contact(31, 40, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, True))
     for second, kept in ((near, [first, near]), (far, [first]), (later, [first, later]), (tied, [tied])):
         assert feet._apart([first, second], places, 30.0) == kept
+
+
+def test_a_stance_between_two_low_steps_is_one():
+    """A foot that shuffles on at .8 m/s, stands half a second, and shuffles on: never fast, never high."""
+    speed = np.repeat([0.8, 0.0, 0.8], [25, 15, 25]) / 30
+    positions = np.zeros((66, 1, 3))
+    positions[1:, 0, 2] = np.cumsum(speed)
+    planted = feet.contacts(positions, np.zeros((66, 1)), 30.0)[:, 0]
+    assert planted[27:39].all()
+    assert not planted[:22].any()
+    assert not planted[44:].any()
+
+
+def test_a_foot_that_drifts_while_it_stands_is_told(walk):
+    """One of them, by 20 cm in a second, of a body that stands: no foot slides fast."""
+    pose = walk.slice(0, 1)
+    clip = walk.with_motion(
+        np.repeat(pose.rotation, len(walk), axis=0), np.repeat(pose.translation, len(walk), axis=0)
+    )
+    whole, gap = Observation.full(clip), (45, 75)
+    assert feet.drift(clip, whole, *gap)[0] == 0
+    moved = clip.translation.copy()
+    moved[:, 0, 2] += np.clip((np.arange(len(walk)) - 45) / 30, 0, 1) * 0.2
+    drifting = clip.with_motion(clip.rotation, moved)
+    way, joint, start, stop = feet.drift(drifting, whole, *gap)
+    assert way == pytest.approx(0.2, abs=0.02)
+    assert joint in feet.ends(walk.skeleton)
+    assert (start, stop) == gap
+    known = gaps_of(drifting, gap)
+    slide = feet.measure(drifting, known, *gap)[0]
+    said = notes.skids(slide, drifting, known, Gap(*gap), 100)
+    assert f"slides by {100 * way:.0f} cm while it stands, in frames 145 to 174" in said[-1]
+    assert notes.skids(0.0, clip, known, Gap(*gap), 0) == []
+
+
+@pytest.mark.parametrize("slide", [28.0, 32.0])
+def test_feet_that_slide_fast_are_told_where_nothing_tells_what_is_usual(walk, slide):
+    """A game's cycle is shorter than a second."""
+    clip = walk.slice(20, 60)
+    known = gaps_of(clip, (10, 36))
+    said = [note for note in notes.skids(slide, clip, known, Gap(10, 36), 0) if "cm/s" in note]
+    assert said == [f"flagged: feet slide at {slide:.0f} cm/s"] * (slide > 30)

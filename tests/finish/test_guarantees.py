@@ -110,8 +110,9 @@ def test_no_pop_at_seams(walk, make, start):
     assert report.seam_after == pytest.approx(100 * jump)
     assert report.seam_limit == pytest.approx(100 * limit)
     assert jump <= limit
-    # Noise may put a foot into a shin, which is said, too.
-    assert report.method == "spline" or all(" cm into the " in note for note in report.notes)
+    # Noise may put a foot into a shin, and interpolation drags feet along, which is said, too.
+    others = [note for note in report.notes if " cm into the " not in note and "while it stands" not in note]
+    assert report.method == "spline" or not others
 
 
 def test_limit_is_the_percentile_of_observed_motion_only(walk):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from interpose.cli.console import progress, say, say_json
-from interpose.cli.outputs import Outputs, print_report, to_json, write_text
+from interpose.cli.outputs import Outputs, licence, print_report, to_json, write_text
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
 
@@ -95,7 +95,15 @@ def forecast(
     if samples > 1:
         say(f"the samples lie apart: {_apart(more['spread'])}")
     written = [*clips, outputs.report, *([outputs.page] if outputs.page else [])]
-    say("\n".join(["", *(f"note: {note}" for note in notes), f"wrote {', '.join(map(str, written))}"]))
+    say(
+        "\n".join(
+            [
+                "",
+                *(f"note: {note}" for note in (*licence(done), *notes)),
+                f"wrote {', '.join(map(str, written))}",
+            ]
+        )
+    )
     return 0
 
 

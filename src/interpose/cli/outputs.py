@@ -232,12 +232,16 @@ def finish(
     else:
         say("\n".join([*describe(file, clip), *([said] if said else []), ""]))
         print_report(completion, clip.fps, why)
-        closed = [card.name for card in used(completion) if not card.open]
-        if closed:
-            named = " and ".join(closed)
-            notes = [f"{named}: for research and non-commercial use; --license open takes others", *notes]
+        notes = [*licence(completion), *notes]
         say("\n".join(["", *(f"note: {note}" for note in notes), outputs.told(dry_run)]))
     return 4 if completion.report.open else 0
+
+
+def licence(completion: Completion) -> list[str]:
+    """A note where weights had a part in it that are not for any use."""
+    closed = [card.name for card in used(completion) if not card.open]
+    named = " and ".join(closed)
+    return [f"{named}: for research and non-commercial use; --license open takes others"] if closed else []
 
 
 def write(

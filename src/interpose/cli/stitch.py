@@ -11,7 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.console import progress, say, say_json, say_table, seconds
-from interpose.cli.outputs import Outputs, print_report, to_json, write
+from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
 from interpose.observation import Gap
@@ -119,7 +119,7 @@ def stitch(
     print_report(done, done.clip.fps, {})
     others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
     rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
-    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *notes)]
+    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *licence(done), *notes)]
     say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
 

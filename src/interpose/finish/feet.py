@@ -181,11 +181,19 @@ def contacts(positions: np.ndarray, floor: np.ndarray, fps: float, step: float =
     planted = np.zeros_like(low)
     for joint in range(low.shape[1]):
         for start, stop in runs(possible[:, joint]):
-            way = positions[start:stop, joint][:, [0, 2]] - positions[start, joint, [0, 2]]
-            moved = np.linalg.norm(way, axis=1).max()
-            if certain[start:stop, joint].any() and stop - start >= SHORT * fps and moved < step:
-                planted[start:stop, joint] = True
+            stances = [(start + a, start + b) for a, b in runs(certain[start:stop, joint])]
+            # Of what moves too far in all, what is slower may be a stance between two low steps.
+            if stances and _gets(positions[start:stop, joint]) < step:
+                stances = [(start, stop)]
+            for first, last in stances:
+                if last - first >= SHORT * fps and _gets(positions[first:last, joint]) < step:
+                    planted[first:last, joint] = True
     return planted
+
+
+def _gets(positions: np.ndarray) -> float:
+    """Metres along the floor that a joint (F, 3) gets away from where it is at first."""
+    return float(np.linalg.norm((positions - positions[0])[:, [0, 2]], axis=1).max())
 
 
 def measure(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, float] | None:
@@ -207,6 +215,20 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     parts = [slice(max(start - 1, 0), stop + 1) for start, stop in ranges]
     slides = [measures.foot_slide(feet[part], clip.fps, floor[part]) for part in parts]
     return list(zip(slides, [measures.foot_travel(feet[part]) for part in parts]))
+
+
+def drift(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int, int] | None:
+    """The furthest that a foot gets in one stance within frames start to stop - 1, in metres; the joint, and
+    the frames of it. None for skeletons whose feet are not known by name; see `measures.stance_drift`."""
+    joints = pairs(clip.skeleton)
+    if not joints.size:
+        return None
+    feet, grown = clip.positions()[:, joints], size(clip.skeleton)
+    floor = grown * local_floor(feet / grown, known.positions(clip.skeleton)[:, joints], clip.fps)
+    inside = slice(start, stop)
+    flat, low = (some[inside].reshape(stop - start, joints.size, *some.shape[3:]) for some in (feet, floor))
+    way, joint, first, last = measures.stance_drift(flat / grown, clip.fps, low / grown)
+    return grown * way, int(joints.ravel()[joint]), start + first, start + last
 
 
 def plant(

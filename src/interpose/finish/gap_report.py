@@ -73,7 +73,7 @@ def gap_report(
             *notes.sunk(finished, known, gap, first),
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),
-            *notes.skids(held[0] if held else None, finished, known, gap),
+            *notes.skids(held[0] if held else None, finished, known, gap, first),
             *notes.hasty(finished, known, gap, first),
             *notes.whirling(finished, known, gap, first),
             *([] if bounds else notes.wild(finished, known, gap, first)),

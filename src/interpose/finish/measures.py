@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
+from interpose.geometry.time import runs
+
 # Height above the floor, in metres, at which a moving foot no longer counts as sliding (Zhang et al. 2018).
 SLIDE_HEIGHT = 0.025
 # Metres a second that joints move on average against the root of a body that is not still.
 STIRS = 0.15
 # Metres a second, and a share of what the hips do, above which a foot goes along with a body that glides.
 GLIDE, ALONG = 0.3, 0.5
+# A stance: metres a second, metres above where a foot rests, and seconds.
+SLOWLY, LOW, DRIFTS = 0.5, 0.02, 0.13
 
 
 def joint_error(positions: np.ndarray, truth: np.ndarray) -> float:
@@ -112,6 +116,26 @@ def foot_slide(positions: np.ndarray, fps: float, floor: np.ndarray | None = Non
     # From one SLIDE_HEIGHT on nothing is left; 2 to the power of all of it may be too much to hold.
     low = np.clip(2.0 - 2.0 ** np.minimum(height / SLIDE_HEIGHT, 1.0), 0.0, 1.0)
     return float((100.0 * fps * step * low).mean())
+
+
+def stance_drift(positions: np.ndarray, fps: float, floor: np.ndarray) -> tuple[float, int, int, int]:
+    """The furthest that a foot gets in one stance, in metres; which joint, and the frames start to stop - 1.
+
+    What `foot_slide`, which is a mean over all frames, does not see: one long slide amid firm stances. A
+    stance is DRIFTS seconds or longer, slower than SLOWLY, and no higher above the floor than LOW.
+
+    Args:
+        positions: (F, n, 3) ankles and/or toes.
+        floor: (F, n) heights at which each of them rests.
+    """
+    still = (speed(positions, fps) < SLOWLY) & (positions[..., 1] < floor + LOW)
+    worst = (0.0, 0, 0, 0)
+    for joint in range(positions.shape[1]):
+        for start, stop in runs(still[:, joint]):
+            if stop - start >= DRIFTS * fps:
+                way = positions[start:stop, joint][:, [0, 2]] - positions[start, joint, [0, 2]]
+                worst = max(worst, (float(np.linalg.norm(way, axis=1).max()), joint, start, stop))
+    return worst
 
 
 def foot_travel(positions: np.ndarray) -> float:
