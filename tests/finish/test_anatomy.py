@@ -125,11 +125,48 @@ def test_a_body_that_spins_takes_its_time(cmu_walk, make, lone):
     assert fastest(filled(clip, Spline()).clip) < 320, "nothing is known of the truth within the gap"
 
 
+def steadily(clip, rate, frames):
+    """The clip with a body that turns about the vertical at so many degrees a second more, in some frames."""
+    turns = np.zeros(len(clip))
+    turns[frames] = rate / clip.fps
+    return about_the_vertical(clip, np.cumsum(turns))
+
+
 def test_who_turns_fast_where_it_is_seen_may_do_so_where_it_is_not(cmu_walk):
-    """And nothing tells at an end of a clip which way to go."""
-    clip = about_the_vertical(cmu_walk, 800.0 * np.arange(len(cmu_walk)) / cmu_walk.fps)
-    for gap in (GAP, Gap(0, 40), Gap(90, len(clip))):
+    clip = steadily(cmu_walk, 800.0, slice(None))
+    assert anatomy.unspun(clip, Observation.from_gaps(clip, [GAP])) is clip
+
+
+def test_nothing_tells_at_an_end_of_a_clip_which_way_to_turn(cmu_walk):
+    for gap in (Gap(0, 40), Gap(90, len(cmu_walk))):
+        clip = steadily(cmu_walk, 800.0, slice(gap.start + 10, gap.stop - 10))
         assert anatomy.unspun(clip, Observation.from_gaps(clip, [gap])) is clip
+
+
+@pytest.mark.parametrize("hand", [False, True])
+def test_a_body_may_turn_faster_amid_motion_than_between_lone_keys(cmu_walk, hand):
+    """Whatever else is lost: it is the hips whose motion tells."""
+    # The walk itself turns there by 120 degrees a second, the other way.
+    clip = steadily(cmu_walk, -480.0, slice(GAP.start + 10, GAP.stop - 10))
+    beside = [Gap(0, GAP.start - 1), Gap(GAP.stop + 1, len(clip))]
+    lost = [Gap(0, len(clip), ("LeftHand",))] * hand
+    assert anatomy.unspun(clip, Observation.from_gaps(clip, [GAP, *lost])) is clip
+    done = anatomy.unspun(clip, Observation.from_gaps(clip, [GAP, *beside, *lost]))
+    assert done is not clip
+
+
+def test_what_is_evened_keeps_its_ends():
+    """However often it is slowed: else its ends would take the speed of its middle. Degrees a second."""
+    rate = np.repeat([50.0, 460.0, 50.0], [15, 25, 15]) / 30
+    yaw = np.concatenate([[0.0], np.cumsum(rate)])
+    even = anatomy._evened(yaw, 300 / 30, 30.0, (50 / 30, 50 / 30))
+    done = 30 * np.diff(even)
+    assert even[[0, -1]] == pytest.approx(yaw[[0, -1]])
+    assert done.max() < 350
+    assert done[[0, -1]].max() < 110
+    # What has no time to be slowed is left.
+    hurried = np.arange(30) * 600.0 / 30
+    assert (anatomy._evened(hurried, 300 / 30, 30.0, (0.0, 0.0)) == hurried).all()
 
 
 def test_a_body_that_spins_too_often_is_said_to(cmu_walk):

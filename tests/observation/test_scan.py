@@ -284,6 +284,18 @@ def test_motion_in_steps_is_repeated_and_neither_frozen_nor_full_of_jumps(real, 
     assert f"{real} frames a second" in found.note
 
 
+def test_what_is_lost_where_frames_repeat_is_found_as_well(cmu_walk):
+    again = np.where(
+        np.arange(len(cmu_walk)) % 5 == 4, np.arange(len(cmu_walk)) - 1, np.arange(len(cmu_walk))
+    )
+    rotation, arm = cmu_walk.rotation[again].copy(), cmu_walk.skeleton.index("LeftArm")
+    rotation[61:63, arm] = rotations.multiply(rotation[61:63, arm], rotations.about("X", np.array(2.0)))
+    found = scan(cmu_walk.with_motion(rotation, cmu_walk.translation[again]))
+    kinds = {one.kind: one.joints for one in found}
+    assert kinds["lost"] == ("LeftArm",)
+    assert "repeated" in kinds
+
+
 def test_who_stands_still_between_motions_is_still_and_not_lost(cmu_walk):
     """No jump, and nobody stops dead: a statue, or a rest pose at the beginning. It is said, not filled."""
     rest = cmu_walk.skeleton.rest_rotation

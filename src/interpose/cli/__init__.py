@@ -12,7 +12,8 @@ import sys
 import threading
 import traceback
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from types import FrameType
 
 from interpose import __version__
@@ -75,7 +76,7 @@ def root_help() -> str:
     return HELP.format(verbs="\n".join(groups))
 
 
-class _Terminated(BaseException):
+class Terminated(BaseException):
     """Somebody wants this process to end; what is half written is deleted on the way out."""
 
 
@@ -84,10 +85,10 @@ def main(tokens: Sequence[str] | None = None) -> int:
     tokens = list(sys.argv[1:] if tokens is None else tokens)
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
-    _heed_termination()
     try:
-        code = _run(tokens, debug)
-        sys.stdout.flush()
+        with _heeding_termination():
+            code = _run(tokens, debug)
+            sys.stdout.flush()
         return code
     except InterposeError as error:
         if debug:
@@ -96,7 +97,7 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return error.exit_code
     except KeyboardInterrupt:
         return 130
-    except _Terminated:
+    except Terminated:
         return 143
     except BrokenPipeError:
         # Who read our output has had enough. The interpreter flushes once more when it ends.
@@ -110,14 +111,23 @@ def main(tokens: Sequence[str] | None = None) -> int:
         return told.exit_code
 
 
-def _heed_termination() -> None:
+@contextmanager
+def _heeding_termination() -> Iterator[None]:
+    """Ask to end: what is half written is deleted on the way out."""
+
     def end(number: int, frame: FrameType | None) -> None:
-        raise _Terminated
+        raise Terminated
 
     # Signals are for the main thread, and who embeds this program may have a mind of their own.
     main = threading.current_thread() is threading.main_thread()
-    if main and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL:
-        signal.signal(signal.SIGTERM, end)
+    if not main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    signal.signal(signal.SIGTERM, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def foreseen(error: Exception) -> InterposeError:

@@ -13,7 +13,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from interpose.cli import foreseen
+from interpose.cli import Terminated, foreseen
 from interpose.cli.console import complain, console, say, say_json
 from interpose.cli.outputs import FOLDERS_MADE, MADE
 from interpose.errors import FileError, NothingError, RequestError
@@ -67,7 +67,7 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 codes.append(error.code)
                 if not options.get("json"):
                     say(f"{error.what}, but {error.left}" if error.left else error.what)
-            except KeyboardInterrupt:
+            except (KeyboardInterrupt, Terminated):
                 if options.get("json"):
                     say_json(reports)
                 raise
@@ -140,11 +140,14 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
 
 def _within(folder: Path) -> Iterator[Path]:
     """The files in a folder and the folders in it, linked ones, too, each of them once."""
-    been = set()
-    for place, folders, files in os.walk(folder, followlinks=True):
-        if (real := os.path.realpath(place)) in been:
-            folders.clear()
-            continue
-        been.add(real)
-        folders.sort()
-        yield from (Path(place, name) for name in files)
+    been: set[str] = set()
+    links = [str(folder)]
+    while links:
+        # What a link leads to is looked into last: it may lie in the folder as well.
+        for place, folders, files in os.walk(links.pop(0)):
+            if (real := os.path.realpath(place)) in been:
+                folders.clear()
+                continue
+            been.add(real)
+            links += sorted(path for name in folders if os.path.islink(path := os.path.join(place, name)))
+            yield from (Path(place, name) for name in files)

@@ -143,19 +143,22 @@ def unspun(opinion: Clip, known: Observation) -> Clip:
     body, fps = find_humanoid(opinion), opinion.fps
     if not body.mapping.usable:
         return opinion
-    yaw, frames = turning(opinion), known.frames
-    both = frames[1:] & frames[:-1]
+    hips = hips_of(opinion.skeleton)
+    seen = np.asarray(known.rotation[:, [hips, *opinion.skeleton.ancestors(hips)]].all(axis=1))
+    yaw, both = turning(opinion), seen[1:] & seen[:-1]
     usual = float(np.degrees(np.abs(np.diff(yaw)))[both].max(initial=0.0)) * fps
     most, slow = (np.radians(max(rate, share * usual)) / fps for rate, share in ((SPINS, OWN), (SLOWLY, 1.0)))
     even = yaw.copy()
-    for start, stop in runs(~known.rotation[:, hips_of(opinion.skeleton)]):
+    for start, stop in runs(~seen):
         if start == 0 or stop == len(yaw):
             continue
-        lone = not frames[max(start - 2, 0) : start].sum() == frames[stop : stop + 2].sum() == 2
+        lone = not seen[max(start - 2, 0) : start].sum() == seen[stop : stop + 2].sum() == 2
+        # How fast it turns in the known frames beside, where nothing tells not at all.
+        ends = (0.0, 0.0) if lone else (yaw[start - 1] - yaw[start - 2], yaw[stop + 1] - yaw[stop])
         part = slice(start - 1, stop + 1)
         # What jumps beside the gap does not go on as the motion did, and is no matter of turning.
         if np.abs(np.diff(yaw[start:stop])).max(initial=0.0) > (slow if lone else most):
-            even[part] = _evened(yaw[part], slow, fps, lone)
+            even[part] = _evened(yaw[part], slow, fps, ends)
     moved = np.abs(even - yaw) > 0
     if not moved.any():
         return opinion
@@ -170,25 +173,25 @@ def unspun(opinion: Clip, known: Observation) -> Clip:
     )
 
 
-def _evened(yaw: np.ndarray, most: float, fps: float, lone: bool) -> np.ndarray:
+def _evened(yaw: np.ndarray, most: float, fps: float, ends: tuple[float, float]) -> np.ndarray:
     """Radians (n,) that change by no more than `most` from frame to frame, as far as the ends, which stay,
-    allow: cubics of Hermite lead over where they do. Of `lone` ends nothing tells how fast they turn."""
+    allow: cubics of Hermite lead over where they do. `ends`: radians a frame before the first and after the
+    last one."""
     even, last = yaw.copy(), len(yaw) - 1
     for _ in range(ROUNDS):
-        rate = np.diff(even)
-        fastest = int(np.abs(rate).argmax())
-        if abs(rate[fastest]) <= most:
+        rate = np.concatenate([ends[:1], np.diff(even), ends[1:]])
+        fastest = int(np.abs(rate[1:-1]).argmax())
+        before = abs(rate[1 + fastest])
+        if before <= most:
             break
         for seconds in SPREADS:
             half = round(min(seconds * fps, last))
             a, b = max(0, fastest - half), min(last, fastest + 1 + half)
-            slope = (0.0 if lone else rate[0]) if a == 0 else rate[a - 1]
-            after = (0.0 if lone else rate[-1]) if b == last else rate[b]
-            y, other, v, w = np.array([even[a], even[b], slope, after])[:, None]
+            y, other, v, w = np.array([even[a], even[b], rate[a], rate[b + 1]])[:, None]
             led = hermite(y, other, v, w, np.arange(b - a + 1.0), np.array(float(b - a)))[:, 0]
             if np.abs(np.diff(led)).max() <= most:
                 break
-        if np.abs(np.diff(led)).max() >= abs(rate[fastest]):
+        if np.abs(np.diff(led)).max() >= before:
             break  # there is no time for it
         even[a : b + 1] = led
     return even

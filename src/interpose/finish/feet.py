@@ -99,8 +99,8 @@ def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
     On each side of a gap the low end of the heights of the joint while it is slow, within two seconds. One
     that is always on its way there rests where the same joint of another foot does, or, when none of them
     stands, where the lowest of them is: what is known may be a single pose with a foot in the air. Where the
-    sides differ by more than LEVEL, there are stairs or a slope between them: a joint rests on the highest of
-    both, and of what lies in a straight line between them, that is not above it by more than STEP_UP.
+    sides differ by more than LEVEL, there is a step between them: a joint rests on the upper one where it is
+    no more than STEP_UP below it.
 
     Args:
         feet: (F, L, 2, 3) ankles and toes of L legs.
@@ -135,10 +135,9 @@ def _below(heights: np.ndarray, at: np.ndarray, rests: np.ndarray) -> np.ndarray
     frames = np.arange(len(heights))
     before = rests[np.clip(np.searchsorted(at, frames, "right") - 1, 0, len(at) - 1)]
     after = rests[np.clip(np.searchsorted(at, frames), 0, len(at) - 1)]
-    between = np.interp(frames, at, rests)
-    levels = np.array([before, after, between])
-    reached = np.where(levels <= heights + STEP_UP, levels, levels.min(axis=0)).max(axis=0)
-    return np.where(np.abs(after - before) > LEVEL, reached, between)
+    upper, lower = np.maximum(before, after), np.minimum(before, after)
+    step = np.where(upper <= heights + STEP_UP, upper, lower)
+    return np.where(upper - lower > LEVEL, step, np.interp(frames, at, rests))
 
 
 def sunk(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int] | None:

@@ -107,7 +107,8 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
 
     Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
     """
-    most = WILD * feet.size(current.skeleton) / current.fps**2 if bounds is None else bounds.peak
+    wild = min(WILD * feet.size(current.skeleton), TORN) / current.fps**2
+    most = wild if bounds is None else bounds.peak
     lo, hi, (start, stop) = span.around(len(current), 3)
     # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
     frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)

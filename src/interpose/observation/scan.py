@@ -155,8 +155,8 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
             or one.stop < again.start - 1
             or one.start > again.stop + 1
         ]
-    findings += repeated
-    findings += _lost(clip, findings)
+    # What repeats spans all else, and says nothing of it.
+    findings += repeated + _lost(clip, findings)
     if not repeated:
         findings += _jumps(clip, known, findings)
         findings += _noisy(clip, known)
