@@ -85,6 +85,34 @@ def test_hips_sink_before_legs_are_torn_straight(cmu_walk, hands):
     assert np.linalg.norm(np.diff(placed, 2, axis=0), axis=-1).max() < 1.5 * own
 
 
+def on_the_belly(clip: Clip) -> Clip:
+    """The same motion of a body that lies: turned by a quarter, its lowest joint 5 cm above the floor."""
+    body = find_humanoid(clip)
+    down = rotations.about("X", np.array(np.pi / 2))
+    turned = rotations.multiply(down, body.rotations(clip))
+    lying = body.to_clip(turned, body.root(clip), clip)
+    moved = lying.translation.copy()
+    moved[:, 0, 1] += 0.05 - lying.positions()[..., 1].min(axis=1)
+    return lying.with_motion(lying.rotation, moved)
+
+
+def test_who_lies_goes_neither_through_the_floor_nor_sinks(cmu_walk, hands):
+    """On a rig with arms that are half as long again."""
+    bones, mapping = hands.skeleton.rest_translation.copy(), find_mapping(hands.skeleton)
+    bones[[mapping[side + part] for side in ("Left", "Right") for part in ("ForeArm", "Hand")]] *= 1.5
+    rig = replace(hands, skeleton=replace(hands.skeleton, rest_translation=bones))
+    lying = on_the_belly(cmu_walk)
+    one, made = find_humanoid(lying), retarget(lying, rig)
+    two = find_humanoid(made)
+    before, after = (body.positions(clip) * body.scale for body, clip in ((one, lying), (two, made)))
+    trunk = [JOINTS.index(name) for name in ("Hips", "Spine2", "LeftHand", "RightHand", "LeftForeArm")]
+    near = before[:, trunk, 1] < 0.1
+    assert near.any()
+    assert (after[:, trunk, 1] - np.minimum(before[:, trunk, 1], 0.1)).min() > -0.03
+    hips = JOINTS.index("Hips")
+    assert np.abs((after - before)[:, hips, 1]).mean() < 0.03
+
+
 def test_it_follows_turns_and_ways_of_the_motion(cmu_walk, hands):
     moved = Placement(0.7, (1.0, 0.0, -2.0)).of(cmu_walk, carriers(cmu_walk))
     ratio = find_mapping(hands.skeleton).leg_length / find_mapping(cmu_walk.skeleton).leg_length

@@ -86,6 +86,13 @@ def lifted(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     fade = np.prod(envelope(inside & ~known.frames, over), axis=0)
     lift = np.array([spread(rounded(column - SINK, SINK / 2), over) for column in deep.T / size]).T
     lift = size * lift * fade[:, None]
+    return higher(clip, known, joints, lift)
+
+
+def higher(clip: Clip, known: Observation, joints: list[int], lift: np.ndarray) -> Clip:
+    """The clip with joints lifted by so many metres (F, n); what is free of the body gives way as little as
+    that takes, feet least of all."""
+    size = feet.size(clip.skeleton)
     moved = np.flatnonzero(lift.max(axis=1, initial=0.0) > NOTHING)
     if not moved.size:
         return clip

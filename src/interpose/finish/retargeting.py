@@ -14,10 +14,12 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import measures
-from interpose.finish.feet import Leg, legs, reach
-from interpose.finish.windows import rounded, spread
+from interpose.finish.feet import Leg, ends, legs, reach
+from interpose.finish.floor import higher
+from interpose.finish.windows import ramp, rounded, spread
 from interpose.geometry import rotations
 from interpose.methods.bodies import RESTS
+from interpose.observation import Observation
 from interpose.observation.timeline import fit, joined, other_rig
 from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping
 from interpose.skeletons.carrier import rooted
@@ -29,6 +31,10 @@ LEVEL, SLOW, SECONDS = 0.05, 0.15, 0.3
 # The share of its length to which a leg may be stretched (or as far as it is already) before the hips sink;
 # the bound is rounded off by the second (metres), and comes and goes over so many seconds.
 TAUT, ROUND, OVER = 0.98, 0.005, 0.15
+# The cosine of what a leg leans by: hips sink for none beyond the first, and fully from the second on.
+UPRIGHT = (0.5, 0.8)
+# Metres above the floor from which on it does not matter how high a joint is that belongs to no foot.
+NEAR = 0.1
 NECK, HEAD = JOINTS.index("Neck"), JOINTS.index("Head")
 
 
@@ -91,8 +97,8 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     toes = all(
         body.mapping[side + "Toe"] is not None for body in (theirs, mine) for side in ("Left", "Right")
     )
-    ends = [JOINTS.index(side + ("Toe" if toes else "Foot")) for side in ("Left", "Right")]
-    points[..., 1] += _rests(mine, like, ends) - _rests(theirs, clip, ends)
+    tips = [JOINTS.index(side + ("Toe" if toes else "Foot")) for side in ("Left", "Right")]
+    points[..., 1] += _rests(mine, like, tips) - _rests(theirs, clip, tips)
     # Who stands higher on the same toes has the hips higher, too.
     over = (_instep(mine) - _instep(theirs)) * toes
     points /= mine.scale
@@ -100,7 +106,7 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     frames = len(clip), 1, 1
     base = like.with_motion(np.tile(held, frames), np.tile(like.translation.mean(axis=0), frames))
     base = replace(base, fps=clip.fps)
-    root, goals = mine.root_over(points, turned[:, 0]), points[:, ends] * mine.hand
+    root, goals = mine.root_over(points, turned[:, 0]), points[:, tips] * mine.hand
     root[:, 1] += over / mine.scale
     made = mine.to_clip(turned, root, base)
     root[:, 1] -= _sunk(made, goals, toes)
@@ -108,6 +114,7 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     for leg in legs(made.skeleton):
         rotation = reach(made.skeleton, leg, made.rotation, *made.kinematics(), _foot(made, leg, goals, toes))
         made = made.with_motion(rotation, made.translation)
+    made = _laid(made, mine, points)
     # A root above the hips goes along if it does so in the other clip.
     whole = joined(like, [like, made])
     known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
@@ -156,6 +163,18 @@ def _foot(clip: Clip, leg: Leg, goals: np.ndarray, toes: bool) -> np.ndarray:
     return np.asarray(feet + (goals[:, leg.side] - feet[:, int(toes)])[:, None])
 
 
+def _laid(clip: Clip, body: Humanoid, points: np.ndarray) -> Clip:
+    """The clip with joints of who lies, crawls or kneels as high above the floor as `points` (F, 22, 3) are:
+    with other proportions arms and thighs would go through it."""
+    rows, joints = (list(some) for some in body.mapping.mapped)
+    theirs, own = points[:, rows, 1], clip.positions()[:, joints, 1]
+    deep = np.where(np.isin(joints, ends(clip.skeleton)), -1.0, np.minimum(theirs, NEAR) - own)
+    size, over = 1.0 / body.scale, OVER * clip.fps
+    lift = np.array([spread(rounded(column, ROUND), over) for column in deep.T / size]).T
+    nothing = np.zeros((len(clip), len(clip.skeleton)), bool)
+    return higher(clip, Observation(nothing, nothing), joints, size * lift)
+
+
 def _sunk(clip: Clip, goals: np.ndarray, toes: bool) -> np.ndarray:
     """(F,) metres by which the hips sink for legs not to be stretched; arguments as in `_foot`."""
     placed, short = clip.positions(), np.full(len(clip), -np.inf)
@@ -163,6 +182,9 @@ def _sunk(clip: Clip, goals: np.ndarray, toes: bool) -> np.ndarray:
         hip, knee, ankle = (placed[:, joint] for joint in (leg.thigh, leg.knee, leg.ankle))
         length = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
         own = np.linalg.norm(ankle - hip, axis=-1)
-        asked = np.linalg.norm(_foot(clip, leg, goals, toes)[:, 0] - hip, axis=-1)
-        short = np.maximum(short, asked - np.maximum(own, TAUT * length))
+        there = _foot(clip, leg, goals, toes)[:, 0] - hip
+        asked = np.linalg.norm(there, axis=-1)
+        # A leg that lies is no shorter for hips that sink.
+        upright = ramp((-there[:, 1] / asked - UPRIGHT[0]) / (UPRIGHT[1] - UPRIGHT[0]))
+        short = np.maximum(short, upright * (asked - np.maximum(own, TAUT * length)))
     return spread(rounded(short, ROUND), OVER * clip.fps) if np.isfinite(short).all() else np.zeros(len(clip))
