@@ -44,6 +44,26 @@ def test_the_arm_is_the_other_s_and_the_body_the_method_s(cmu_walk, part, method
     assert jumps.max() < 1.5 * own.max(), "no harder than the other clip's arm itself"
 
 
+def test_on_a_body_that_is_known_the_arm_points_where_it_did(cmu_walk, part):
+    """As seen from where the hips face; here of a body that leans, and faces elsewhere."""
+    lean = rotations.multiply(rotations.about("Y", np.array(2.0)), rotations.about("X", np.array(0.4)))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(lean, rotation[:, 0])
+    leaning = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    done = interpose.fill(leaning, [Gap(75, 105, ARM)], parts=part).clip
+
+    def aims(clip, frames):
+        turned = clip.slice(*frames).kinematics()[0]
+        faces = rotations.twist_about(turned[:, 0], [0.0, 1.0, 0.0])
+        arm = turned[:, [clip.skeleton.index(name) for name in ARM]]
+        return rotations.multiply(rotations.conjugate(faces)[:, None], arm)
+
+    apart = rotations.angle(aims(done, (85, 93)), aims(part.clip, (40, 48)))
+    assert apart.max() < 1e-6
+    others = [i for i, name in enumerate(cmu_walk.skeleton.names) if name not in ARM]
+    assert done.rotation[:, others].tobytes() == leaning.rotation[:, others].tobytes()
+
+
 def test_what_the_gap_hid_has_no_influence(cmu_walk, part):
     rotation = cmu_walk.rotation.copy()
     rotation[75:105] = [0.5, -0.5, 0.5, 0.5]

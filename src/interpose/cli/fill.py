@@ -77,8 +77,9 @@ def fill(
             another rig is retargeted.
         from_range: START:STOP, the frames of it that are used; all without it.
         at: the frame at which they begin.
-        layer: the --joints alone are another clip's, and eased in and out; all else stays as it is, where
-            otherwise the whole pose of a --gap is filled around them.
+        layer: the --joints alone are another clip's, and eased in and out: they point where they do there, as
+            seen from where the hips face. All else stays as it is, where otherwise the whole pose of a --gap
+            is filled around them.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
             to hold it there. May be repeated.

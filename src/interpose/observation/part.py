@@ -11,7 +11,9 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.observation.observation import Observation, frame_number
+from interpose.skeletons.carrier import hips_of
 
+UP = np.array([0.0, 1.0, 0.0])
 SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
 
 
@@ -43,6 +45,10 @@ class Part:
 def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Clip, Observation]:
     """The clip with the parts in it, and the observation that knows them.
 
+    Where the body that a part hangs on is known it points where it does in the other clip, as seen from where
+    the hips face: an arm that waves over the head does so on a trunk that leans, too. Where the body is yet
+    to be filled a part keeps its local rotations.
+
     Raises:
         RequestError: frames or joints that are not there, a part that reaches out of the gaps, another frame
             rate, or joints that rest differently.
@@ -55,8 +61,34 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
             here, there = clip.skeleton.index(name), part.clip.skeleton.index(name)
             rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
             known[to, here] = True
+        _hung(rotation, clip, observation, part)
     laid = Observation(known, observation.translation, observation.pins)
     return clip.with_motion(rotation, clip.translation), laid
+
+
+def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part) -> None:
+    """Turn the topmost joints of a part, in `rotation` (F, J, 4), as `lay` says."""
+    to, skeleton = slice(part.at, part.at + part.stop - part.start), clip.skeleton
+    hips, joints = hips_of(skeleton), {skeleton.index(name) for name in part.joints}
+    tops = [
+        joint
+        for joint in joints
+        if hips in (above := skeleton.ancestors(joint))
+        and not joints & {*above}
+        and observation.rotation[to, [*above]].all()
+    ]
+    if not tops:
+        return
+    here = clip.slice(to.start, to.stop).kinematics()[0]
+    there = part.clip.slice(part.start, part.stop).kinematics()[0]
+    other = part.clip.skeleton
+    mine = rotations.twist_about(here[:, hips], UP)
+    theirs = rotations.twist_about(there[:, hips_of(other)], UP)
+    between = rotations.multiply(mine, rotations.conjugate(theirs))
+    for joint in tops:
+        aims = rotations.multiply(between, there[:, other.index(skeleton.names[joint])])
+        parent = here[:, skeleton.parents[joint]]
+        rotation[to, joint] = rotations.normalize(rotations.multiply(rotations.conjugate(parent), aims))
 
 
 def _check(clip: Clip, observation: Observation, part: Part) -> None:
