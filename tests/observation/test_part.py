@@ -54,7 +54,7 @@ def test_on_a_body_that_is_known_the_arm_points_where_it_did(cmu_walk, part):
 
     def aims(clip, frames):
         turned = clip.slice(*frames).kinematics()[0]
-        faces = rotations.twist_about(turned[:, 0], [0.0, 1.0, 0.0])
+        faces = rotations.twist_about(turned[:, 0], np.array([0.0, 1.0, 0.0]))
         arm = turned[:, [clip.skeleton.index(name) for name in ARM]]
         return rotations.multiply(rotations.conjugate(faces)[:, None], arm)
 
