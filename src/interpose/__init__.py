@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.scan import Finding
-    from interpose.tasks import Forecast, Stitched
+    from interpose.tasks import Cycle, Forecast, Stitched
 
 __version__ = "0.1.0"
 
@@ -44,6 +44,7 @@ __all__ = [
     "Skeleton",
     "__version__",
     "between",
+    "cycle",
     "denoise",
     "fill",
     "forecast",
@@ -322,6 +323,25 @@ def forecast(
     from interpose import tasks
 
     return tasks.forecast(_clip(clip), frames, samples, method, seed, temperature, progress)
+
+
+def cycle(clip: Clip | str | Path) -> Cycle:
+    """The part of a motion that goes round best already: of a walk one stride or several.
+
+    Args:
+        clip: a clip, or the path of one.
+
+    Returns:
+        The frames to keep and how many lead back: `found = cycle(clip)`, then
+        `stitch(clip.slice(found.start, found.stop), found.frames, loop=True)` is as long as the motion took.
+
+    Raises:
+        RequestError: no humanoid, or nothing in it comes back.
+        FileError: the file cannot be read.
+    """
+    from interpose import tasks
+
+    return tasks.cycle(_clip(clip))
 
 
 def stitch(

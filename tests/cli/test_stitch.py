@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from interpose.formats import load, save
+from interpose.geometry import rotations
 
 
 @pytest.fixture
@@ -138,3 +139,33 @@ def test_a_rest_pose_that_is_stitched_in_is_said(run, takes):
     again = run("stitch", "walk.bvh", better, "--frames", "9", "--force")
     assert again.code == 0
     assert "nothing to do with the rest" not in again.out
+
+
+def test_a_loop_of_the_part_that_goes_round_is_a_stride(run, takes):
+    done = run("stitch", "walk.bvh#20:100", "--loop", "--trim", "--json")
+    assert done.code == 0
+    start, stop = map(int, done.json["clips"][0]["part"].split(":"))
+    assert 20 <= start < stop <= 100
+    made, walk = load(takes / "walk.stitched.bvh"), load(takes / "walk.bvh")
+    assert 4 <= len(made) - (stop - start) <= 6
+    assert rotations.angle(made.rotation[: stop - start], walk.rotation[start:stop]).max() < 1e-6
+    # Round and round it is no further from itself than from one frame to the next.
+    steps = np.degrees(rotations.angle(made.rotation, np.roll(made.rotation, 1, axis=0))).mean(axis=1)
+    assert steps[0] < 2 * np.median(steps)
+    loop = done.json["loop"]
+    assert abs(loop["yaw"]) < 30
+    assert 0.5 < loop["way"] < 2
+    assert loop["jump"] <= loop["limit"]
+
+
+@pytest.mark.parametrize("more", [[], ["--loop", "--frames", "4"], ["--loop", "run.bvh"]])
+def test_what_is_trimmed_is_one_loop(run, takes, more):
+    done = run("stitch", "walk.bvh", "--trim", *more)
+    assert done.code == 2
+    assert "--trim goes with --loop alone" in done.err
+
+
+def test_what_never_comes_back_is_not_trimmed(run, takes):
+    done = run("stitch", "jump.bvh#30:60", "--loop", "--trim")
+    assert done.code == 2
+    assert "goes round" in done.err

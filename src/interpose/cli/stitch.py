@@ -21,9 +21,10 @@ if TYPE_CHECKING:
     from interpose.clip import Clip
     from interpose.observation.timeline import Placement
     from interpose.tasks import Stitched
+    from interpose.tasks.stitching import Loop
 
 # Of what only this verb measures.
-UNITS = {"yaw": "degrees", "shift": "m", "jump": "cm/frame^2", "limit": "cm/frame^2"}
+UNITS = {"yaw": "degrees", "shift": "m", "way": "m", "jump": "cm/frame^2", "limit": "cm/frame^2"}
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,7 @@ def stitch(
     frames: str = "auto",
     align: Annotated[bool, Parameter(negative="--no-align")] = True,
     loop: bool = False,
+    trim: bool = False,
     action: str = "",
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
@@ -75,6 +77,7 @@ def stitch(
       interpose stitch walk.bvh run.bvh jump.bvh --frames 20,45
       interpose stitch walk.bvh#10:90 sit.bvh#120:300 --no-align
       interpose stitch walk.bvh --loop
+      interpose stitch walk.bvh --loop --trim
 
     Args:
         files: FILE or FILE#START:STOP, frames START to STOP - 1 of it, or seconds (.bvh, .npz, .amc); without
@@ -82,6 +85,8 @@ def stitch(
         frames: how many frames to generate: one number, or one for each gap; auto chooses what is unhurried.
         align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
         loop: lead back to the beginning as well, so that the motion can be played round and round.
+        trim: with --loop, keep the part of the clip that goes round best already, such as one stride of a
+            walk, and generate a few frames alone.
         action: what the generated motion is; `interpose models small` lists what there is.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
@@ -99,6 +104,8 @@ def stitch(
         raise RequestError("no clips are named", "it takes two or more", "Write stitch walk.bvh run.bvh.")
     pieces = _read(files, reading)
     pieces = [_fitted(piece, pieces[0].whole) for piece in pieces]
+    if trim:
+        pieces, frames = _trimmed(pieces, loop, frames)
     first = pieces[0].file
     outputs = Outputs.choose(first, output, "stitched", player)
     for piece in pieces:
@@ -122,6 +129,20 @@ def stitch(
     said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *licence(done), *notes)]
     say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
+
+
+def _trimmed(pieces: list[Piece], loop: bool, frames: str) -> tuple[list[Piece], str]:
+    """The part of a clip that goes round, and how many frames lead back."""
+    from interpose import tasks
+
+    if not loop or len(pieces) > 1 or frames != "auto":
+        why = "it keeps the part of one clip that goes round, and says how many frames lead back"
+        raise RequestError("--trim goes with --loop alone", why, "Write stitch walk.bvh --loop --trim.")
+    (piece,) = pieces
+    found = tasks.cycle(piece.clip)
+    offset = 0 if piece.part is None else Gap.parse(piece.part, clip=piece.whole).start
+    part = f"{offset + found.start}:{offset + found.stop}"
+    return [replace(piece, part=part, clip=_part(piece.file, piece.whole, part))], str(found.frames)
 
 
 def _read(texts: Sequence[str], reading: Reading) -> list[Piece]:
@@ -209,7 +230,12 @@ def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:
     loop = done.loop
     if loop is None:
         return {"clips": clips}
-    closing = {"gap_before": loop.why, "jump": loop.jump, "limit": loop.limit}
+    closing = {
+        "way": round(_way(done, loop), 4),
+        "gap_before": loop.why,
+        "jump": loop.jump,
+        "limit": loop.limit,
+    }
     return {"clips": clips, "loop": {**_placed(loop.placement), **closing}}
 
 
@@ -233,14 +259,19 @@ def _print_clips(pieces: list[Piece], done: Stitched) -> None:
     )
 
 
+def _way(done: Stitched, loop: Loop) -> float:
+    """Metres that the hips get on each time a loop goes round. Turned about the origin, what lies far from it
+    is shifted a long way: it is the body's own that is meant."""
+    hips = done.clip.slice(0, 1).positions()[0, hips_of(done.clip.skeleton)]
+    return float(np.hypot(*(loop.placement.at(hips) - hips)[::2]))
+
+
 def _closing(done: Stitched) -> list[str]:
     """How a loop closes."""
     loop = done.loop
     if loop is None:
         return []
-    # Turned about the origin, what lies far from it goes a long way: it is the body's own that is meant.
-    hips = done.clip.slice(0, 1).positions()[0, hips_of(done.clip.skeleton)]
-    way = np.hypot(*(loop.placement.at(hips) - hips)[::2])
+    way = _way(done, loop)
     turned = np.degrees(loop.placement.yaw)
     lines = [f"loop: {loop.why}"] if loop.why else []
     lines += [f"loop: frame 0 follows frame {len(done.clip) - 1}, each time {way:.2f} m on"]

@@ -21,6 +21,10 @@ SHORTEST, LONGEST = 0.5, 1.8
 MOMENT = 3.0  # seconds at the end of a clip, or its beginning, that tell its stride
 # A stride comes back to where it was within this share of what poses of it are apart in the mean.
 ALIKE = 0.5
+# Seconds that a motion which goes round takes at most; and the share of what its poses are from their mean
+# within which it comes back.
+ROUND, CLOSES = 8.0, 0.5
+TURNED = 0.05  # metres that joints may be apart instead of the body going round by a radian
 
 
 @dataclass(frozen=True)
@@ -105,3 +109,30 @@ def in_step(body: Humanoid, before: Clip, after: Clip) -> InStep | None:
         rate=float(sum(rates) / 2) * body.hand[0],
         velocities=(ways[0] * body.hand, ways[1] * body.hand),
     )
+
+
+def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
+    """The frames of a motion between which it may go round: at the second one it is as it was at the first,
+    in pose and pace, and heads about where it did; and by how many metres joints are apart there.
+
+    The two that are most alike, from SHORTEST to ROUND seconds apart. None where nothing comes back.
+    """
+    placed = body.positions(clip)
+    hips = placed[:, :1] * FLOOR.values
+    faces = np.unwrap(facing(placed))
+    around = turn(placed - hips, -faces[:, None])
+    ways = turn(np.gradient(hips[:, 0], axis=0), -faces) if len(clip) > 1 else np.zeros((len(clip), 3))
+    paces = AHEAD * clip.fps * (np.gradient(around, axis=0) + ways[:, None]) if len(clip) > 1 else around
+    seen = np.concatenate([around, paces], axis=1)
+    least, most = round(SHORTEST * clip.fps), min(round(ROUND * clip.fps), len(clip) - 1)
+    best: tuple[float, int, int] | None = None
+    for lag in range(least, most + 1):
+        apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
+        apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
+        at = int(apart.argmin())
+        best = min(best or (np.inf, 0, 0), (float(apart[at]), at, at + lag))
+    if best is None:
+        return None
+    # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
+    usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
+    return None if best[0] > CLOSES * usual else (best[1], best[2], best[0])

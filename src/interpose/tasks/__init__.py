@@ -5,13 +5,15 @@ from interpose.tasks.forecasting import Forecast, forecast
 from interpose.tasks.keys import between, block
 from interpose.tasks.planning import plan
 from interpose.tasks.recovering import denoise, recover
-from interpose.tasks.stitching import Stitched, stitch
+from interpose.tasks.stitching import Cycle, Stitched, cycle, stitch
 
 __all__ = [
+    "Cycle",
     "Forecast",
     "Stitched",
     "between",
     "block",
+    "cycle",
     "denoise",
     "fill",
     "fitted",

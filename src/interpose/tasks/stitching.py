@@ -6,9 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from interpose.clip import Clip
+from interpose.errors import RequestError
 from interpose.finish import Completion, on_rig_of
 from interpose.finish.measures import acceleration
-from interpose.observation import timeline
+from interpose.observation import gait, timeline
+from interpose.skeletons import find_humanoid
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
@@ -16,6 +18,7 @@ from interpose.tasks.windows import raw_part
 # on either side with which that is tried; metres that feet have to travel in it; and the slide (cm/s) that
 # counts as much as gliding all along.
 TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
+BRIDGE = 0.15  # seconds that are generated of a motion that goes round already
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,42 @@ def stitch(
         clips=line.laid,
         loop=closing,
     )
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Where a motion goes round already.
+
+    Attributes:
+        start, stop: the frames start to stop - 1 that are kept.
+        frames: how many more lead back to the first of them: `stitch(clip.slice(start, stop), frames,
+            loop=True)` takes as long as the motion itself did.
+        apart: metres, in the mean over joints and how they move, that it was off by when it came back.
+    """
+
+    start: int
+    stop: int
+    frames: int
+    apart: float
+
+
+def cycle(clip: Clip) -> Cycle:
+    """The part of a motion that loops best: of a walk one stride or several, of a dance a figure.
+
+    Raises:
+        RequestError: no humanoid, or nothing in it comes back.
+    """
+    body = find_humanoid(clip)
+    found = gait.cycle(body, clip) if body.mapping.usable and len(clip) else None
+    if found is None:
+        raise RequestError(
+            f"no part of {clip.name or 'the clip'} goes round",
+            "in none of its poses it is nearly as it was half a second to eight seconds before",
+            "Leave out --trim: then a way back to the beginning is generated.",
+        )
+    begin, end, apart = found
+    bridge = min(max(2, round(BRIDGE * clip.fps)), end - begin - 2)
+    return Cycle(begin, end - bridge, bridge, apart)
 
 
 def _tried(
