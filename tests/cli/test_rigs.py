@@ -171,3 +171,15 @@ def test_a_map_is_of_the_file_whose_joints_it_names(run, rigs):
     odd = (rigs / "walk.map.json").read_text().replace("LeftFoot", "Hoof")
     (rigs / "odd.map.json").write_text(odd)
     assert run("convert", "walk.bvh", "x.bvh", "--onto", "hands.bvh", "--map", "odd.map.json").code == 2
+
+
+def test_joints_are_known_without_their_namespace(run, rigs):
+    """LeftArm is mixamorig:LeftArm; what is ambiguous, or nowhere, is refused as ever."""
+    done = run("fill", "hands.bvh", "--gap", "40:60", "--joints", "LeftArm,LeftForeArm", "--json")
+    assert done.code == 0
+    assert done.json["gaps"][0]["joints"] == ["mixamorig:LeftArm", "mixamorig:LeftForeArm"]
+    pinned = run("fill", "hands.bvh", "--gap", "40:60", "--pin", "LeftHand@50:0,100,0", "-o", "p.bvh")
+    assert pinned.code == 0
+    lost = run("recover", "hands.bvh", "--joints", "RightForeArm", "--frames", "40:60", "--json")
+    assert lost.json["gaps"][0]["joints"] == ["mixamorig:RightForeArm"]
+    assert "LeftWing" in run("fill", "hands.bvh", "--gap", "40:60", "--joints", "LeftWing").err

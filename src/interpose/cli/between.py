@@ -43,7 +43,8 @@ def between(
     Keys are frames of one file, or poses of several: then the motion begins
     with --start, --frames new frames follow, and --target is the last, on the
     body of --start, to which other rigs are retargeted. How it leaves the one and
-    meets the other is told by the frames beside them in their files. What lies
+    meets the other is told by the frames beside them in their files; both stay
+    where they are there, and `interpose stitch` places clips to go on. What lies
     between the keys of a file has no influence; what lies before the first and
     after the last one stays as it is. Writes the clip and a report beside the
     input: keys.between.bvh and keys.between.json.

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, to_json, write
-from interpose.cli.reading import Reading, describe, split_names
+from interpose.cli.reading import Reading, describe, full_names, split_names
 from interpose.errors import RequestError
 
 UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm", "turned": "degrees", "turned_most": "degrees"}
@@ -70,6 +70,7 @@ def denoise(
         )
     check_method(method, license)
     clip = reading.load(file)
+    chosen = chosen and full_names(chosen, clip)
     part = range_of(frames, clip) if frames is not None else None
     outputs = Outputs.choose(file, output, "denoised", player)
     if not dry_run:

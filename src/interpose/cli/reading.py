@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -87,6 +87,14 @@ class Reading:
 def split_names(texts: list[str]) -> tuple[str, ...]:
     """Names from options that hold one or several, separated by commas."""
     return tuple(name.strip() for text in texts for name in text.split(",") if name.strip())
+
+
+def full_names(names: Iterable[str], clip: Clip) -> tuple[str, ...]:
+    """Names of joints as the skeleton has them: LeftArm is mixamorig:LeftArm, if that is the only one."""
+    own, bare = clip.skeleton.names, dict[str, list[str]]()
+    for name in own:
+        bare.setdefault(name.rpartition(":")[2], []).append(name)
+    return tuple(bare[n][0] if n not in own and len(bare.get(n, ())) == 1 else n for n in names)
 
 
 def describe(path: Path, clip: Clip) -> list[str]:

@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from interpose.cli.batch import each
 from interpose.cli.console import names, progress, say
 from interpose.cli.outputs import Outputs, finish
-from interpose.cli.reading import Reading, split_names
+from interpose.cli.reading import Reading, full_names, split_names
 from interpose.errors import NothingError, RequestError
 
 SHOWN = 4  # losses, of many
@@ -82,6 +82,7 @@ def recover(
         )
     check_method(method, license)
     clip = reading.load(file)
+    chosen = chosen and full_names(chosen, clip)
     gap = range_of(frames, clip, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
     for name in chosen or ():

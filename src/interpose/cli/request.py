@@ -11,7 +11,7 @@ import numpy as np
 
 from interpose.cli.console import names
 from interpose.cli.outputs import is_report, read_json
-from interpose.cli.reading import Reading, split_names
+from interpose.cli.reading import Reading, full_names, split_names
 from interpose.clip import Clip
 from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
@@ -88,6 +88,7 @@ def from_options(
         raise RequestError(
             "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
         )
+    chosen = chosen and full_names(chosen, clip)
     listed = [Gap.parse(text, chosen, clip) for text in ranges]
     if gaps is not None:
         if chosen and not ranges:
@@ -195,7 +196,7 @@ def part_of(
         )
     other = reading.load_fitting(path)[0]
     whole = Gap(0, len(other)) if span is None else _frames(span)
-    part = Part(other, whole.start, whole.stop, at, names)
+    part = Part(other, whole.start, whole.stop, at, full_names(names, clip))
     (fitted,) = tasks.fitted([part], clip)
     return [Lent(path, f"{whole.start}:{whole.stop}", fitted, fitted.clip.skeleton is not other.skeleton)]
 
@@ -306,9 +307,10 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
                 "a pin is a joint, a frame or a range, and three coordinates in the file's own unit and axes",
                 "Write for example --pin LeftHand@130:35,142,-20, or LeftHand@130:140:35,142,-20 to hold it.",
             )
-        clip.skeleton.index(match[1])
+        (joint,) = full_names([match[1]], clip)
+        clip.skeleton.index(joint)
         frames = np.arange(start, stop)
-        found.append(Pin(match[1], frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
+        found.append(Pin(joint, frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
     return found
 
 

@@ -185,4 +185,5 @@ def _check_free(path: Path, force: bool) -> None:
     if not path.parent.is_dir():
         raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
     if path.exists() and not force:
-        raise RequestError(what, "the file exists already", "Choose another name with -o, or add --force.")
+        fix = "Choose another name, or add --force (force=True)."
+        raise RequestError(what, "the file exists already", fix)
