@@ -79,6 +79,21 @@ def test_a_root_that_stays_does_so_in_a_gap(cmu_walk):
     assert np.ptp(done.root, axis=0).max() < 1e-6
 
 
+def test_a_root_on_the_floor_that_turns_stays_upright_and_on_it(cmu_walk):
+    """About the vertical, by half a turn and back; its own axes are those of a program with Z up."""
+    rigged = under_root(cmu_walk, True)
+    turned, placed = rigged.kinematics()
+    lying = rotations.about("X", np.array(-np.pi / 2))
+    yaw = rotations.about("Y", 1.5 * np.sin(np.arange(len(rigged)) / 15))
+    led = moved(rigged, {0: (rotations.multiply(yaw, lying), placed[:, 0] * [1.0, 0.0, 1.0])})
+    led = moved(led, {1: (turned[:, 1], placed[:, 1])})
+    done = interpose.fill(led, (60, 90), method="small").clip
+    there, at = done.kinematics()
+    up = rotations.rotate(there[:, 0], np.broadcast_to([0.0, 0.0, 1.0], (len(done), 3)))
+    assert np.abs(up - [0.0, 1.0, 0.0]).max() < 1e-6
+    assert np.abs(at[:, 0, 1]).max() < 1e-9
+
+
 def test_a_path_leads_the_hips(rigged, cmu_walk):
     gap, middle = (140, 190), 165
     point = cmu_walk.root[middle, [0, 2]] + [0.4, 0.2]

@@ -16,6 +16,9 @@ from interpose.skeletons.mapping import find_mapping
 
 NEAR = 0.3  # metres over the floor within which a root stays that goes along with the hips
 STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
+# What of a root's height (metres) changes, and what points up at it leans (radians), at most, is none.
+LEVEL, LEANS = 2e-3, 2e-3
+UP = np.array([0.0, 1.0, 0.0])
 
 
 def hips_of(skeleton: Skeleton) -> int:
@@ -76,7 +79,8 @@ def rooted(clip: Clip, known: np.ndarray) -> Clip:
     """The clip with a root above the hips where it belongs in frames where the place of neither is known.
 
     As far aside of them as before and after, if it goes along with them in all known frames (what game
-    engines call root motion); or where it was, if it stands still in these. The body stays where it is.
+    engines call root motion); or where it was, if it stands still in these. What is upright in all known
+    frames, or at one height, stays so. The body stays where it is.
 
     known: (F, J) which local translations are.
     """
@@ -97,9 +101,22 @@ def rooted(clip: Clip, known: np.ndarray) -> Clip:
         usual = np.stack([np.interp(np.arange(len(clip)), at, axis[at]) for axis in aside.T], axis=1)
         there = placed[:, root] + (usual - aside) * free[:, None]
     else:
-        return clip
-    led = moved(clip, {root: (turned[:, root], there)})
+        there = placed[:, root].copy()
+    if np.ptp(placed[both, root, 1]) < LEVEL:
+        there[free, 1] = placed[both, root, 1].mean()
+    led = moved(clip, {root: (_upright(turned[:, root], both, free), there)})
     return moved(led, {hips: (turned[:, hips], placed[:, hips])})
+
+
+def _upright(turned: np.ndarray, known: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Rotations (F, 4), those that are `free` (F,) brought upright if all that are `known` are."""
+    # What points up in the first known frame points up in all of them, if it turns about the vertical alone.
+    up = rotations.rotate(rotations.conjugate(turned[known][0]), UP)
+    ways = rotations.rotate(turned, np.broadcast_to(up, (len(turned), 3)))
+    if (np.linalg.norm(ways[known] - UP, axis=-1) > LEANS).any():
+        return turned
+    back = rotations.between(ways, np.broadcast_to(UP, ways.shape))
+    return np.where(free[:, None], rotations.normalize(rotations.multiply(back, turned)), turned)
 
 
 def _still(clip: Clip, joint: int) -> bool:
