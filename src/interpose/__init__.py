@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from interpose.errors import FileError, InterposeError, RequestError
     from interpose.finish import Completion
     from interpose.formats import load, save
+    from interpose.geometry.time import resample
     from interpose.methods.registry import names as method_names
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
@@ -52,6 +53,7 @@ __all__ = [
     "load",
     "method_names",
     "recover",
+    "resample",
     "retarget",
     "save",
     "scan",
@@ -73,6 +75,7 @@ _HOMES = {
     "license": "interpose.methods.weights:licensed",
     "load": "interpose.formats",
     "method_names": "interpose.methods.registry:names",
+    "resample": "interpose.geometry.time",
     "save": "interpose.formats",
 }
 
