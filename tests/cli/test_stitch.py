@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose.formats import load, save
 from interpose.geometry import rotations
@@ -169,3 +171,13 @@ def test_what_never_comes_back_is_not_trimmed(run, takes):
     done = run("stitch", "jump.bvh#30:60", "--loop", "--trim")
     assert done.code == 2
     assert "goes round" in done.err
+
+
+def test_roots_that_go_along_in_one_clip_alone_are_told(run, tmp_path, cmu_walk):
+    for name, goes in (("goes", True), ("stays", False)):
+        save(replace(under_root(cmu_walk, goes), source=None), tmp_path / f"{name}.bvh")
+    done = run("stitch", "goes.bvh#0:60", "stays.bvh#10:70", "--frames", "10")
+    assert done.code == 0
+    assert "goes along in goes.bvh#0:60 and stays where it is in stays.bvh#10:70" in done.out
+    same = run("stitch", "goes.bvh#0:60", "goes.bvh#60:120", "--frames", "10", "--force")
+    assert "goes along" not in same.out

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from interpose.cli.console import progress, say, say_json, say_table, seconds
+from interpose.cli.console import names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from interpose.tasks import Stitched
     from interpose.tasks.stitching import Loop
 
+TRAVELS = 0.5  # metres over the floor: a body that travels, whose root may go along
 # Of what only this verb measures.
 UNITS = {"yaw": "degrees", "shift": "m", "way": "m", "jump": "cm/frame^2", "limit": "cm/frame^2"}
 
@@ -126,7 +127,7 @@ def stitch(
     print_report(done, done.clip.fps, {})
     others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
     rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
-    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *licence(done), *notes)]
+    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *_roots(pieces), *licence(done), *notes)]
     say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
 
@@ -186,6 +187,25 @@ def _odd(pieces: list[Piece]) -> Iterator[str]:
             better = f"{piece.file}#{start + first}:{start + last}"
             what = "begins" if first else "ends"
             yield f"{piece} {what} with a frame that has nothing to do with the rest: {better} leaves it out"
+
+
+def _roots(pieces: list[Piece]) -> Iterator[str]:
+    """Where a root above the hips goes along in one piece and stays where it is in another."""
+    skeleton = pieces[0].clip.skeleton
+    above = skeleton.ancestors(hips := hips_of(skeleton))
+    if not above or above[-1] not in pieces[0].clip.translated:
+        return
+    moved = {True: list[str](), False: list[str]()}
+    for piece in pieces:
+        root, body = (
+            np.ptp(piece.clip.positions()[:, joint, ::2], axis=0).max() for joint in (above[-1], hips)
+        )
+        if body > TRAVELS:
+            moved[bool(root > body / 2)].append(str(piece))
+    if moved[True] and moved[False]:
+        goes, stays = (names(list(dict.fromkeys(moved[one]))) for one in (True, False))
+        ways = f"goes along in {goes} and stays where it is in {stays}"
+        yield f"{skeleton.names[above[-1]]} {ways}: between them it leads from the one to the other"
 
 
 def _fitted(piece: Piece, first: Clip) -> Piece:
