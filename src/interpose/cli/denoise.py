@@ -10,8 +10,7 @@ from cyclopts import Parameter
 from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, to_json, write
-from interpose.cli.reading import Reading, describe, full_names, split_names
-from interpose.errors import RequestError
+from interpose.cli.reading import Reading, describe, joints_of
 
 UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm", "turned": "degrees", "turned_most": "degrees"}
 
@@ -63,22 +62,15 @@ def denoise(
     from interpose import tasks
     from interpose.cli.request import check_method, range_of
 
-    chosen = split_names(joints)
-    if joints and not chosen:
-        raise RequestError(
-            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
-        )
     check_method(method, license)
     clip = reading.load(file)
-    chosen = chosen and full_names(chosen, clip)
+    chosen = joints_of(joints, clip)
     part = range_of(frames, clip) if frames is not None else None
     outputs = Outputs.choose(file, output, "denoised", player)
     if not dry_run:
         outputs.check(file, force)
     with progress(f"denoising {file.name}", len(clip)):
-        done = tasks.denoise(
-            clip, strength, chosen or None, (part.start, part.stop) if part else None, method, seed
-        )
+        done = tasks.denoise(clip, strength, chosen, (part.start, part.stop) if part else None, method, seed)
     more = {"dry_run": True} if dry_run else {}
     more["denoised"] = done.report.to_dict()["denoised"]
     report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)

@@ -97,6 +97,15 @@ def full_names(names: Iterable[str], clip: Clip) -> tuple[str, ...]:
     return tuple(bare[n][0] if n not in own and len(bare.get(n, ())) == 1 else n for n in names)
 
 
+def joints_of(texts: list[str], clip: Clip) -> tuple[str, ...] | None:
+    """The joints of --joints, by their full names; None without any. RequestError where it names none."""
+    if texts and not split_names(texts):
+        raise RequestError(
+            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
+        )
+    return full_names(split_names(texts), clip) or None
+
+
 def describe(path: Path, clip: Clip) -> list[str]:
     """What was read, and what was estimated, for a person."""
     size = f"{len(clip)} frames at {clip.fps:.4g} fps ({clip.seconds:.1f} s), {len(clip.skeleton)} joints"

@@ -12,8 +12,8 @@ from cyclopts import Parameter
 from interpose.cli.batch import each
 from interpose.cli.console import names, progress, say
 from interpose.cli.outputs import Outputs, finish
-from interpose.cli.reading import Reading, full_names, split_names
-from interpose.errors import NothingError, RequestError
+from interpose.cli.reading import Reading, joints_of
+from interpose.errors import NothingError
 
 SHOWN = 4  # losses, of many
 
@@ -75,14 +75,9 @@ def recover(
     from interpose.observation.scan import NO_GAPS, scan
     from interpose.skeletons.carrier import STILL
 
-    chosen = split_names(joints) if joints else None
-    if chosen is not None and not chosen:
-        raise RequestError(
-            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
-        )
     check_method(method, license)
     clip = reading.load(file)
-    chosen = chosen and full_names(chosen, clip)
+    chosen = joints_of(joints, clip)
     gap = range_of(frames, clip, chosen) if frames is not None else Gap(0, len(clip), chosen)
     gap.check(len(clip))
     for name in chosen or ():

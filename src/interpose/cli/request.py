@@ -11,7 +11,7 @@ import numpy as np
 
 from interpose.cli.console import names
 from interpose.cli.outputs import is_report, read_json
-from interpose.cli.reading import Reading, full_names, split_names
+from interpose.cli.reading import Reading, full_names, joints_of, split_names
 from interpose.clip import Clip
 from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
@@ -83,12 +83,7 @@ def from_options(
     reading: Reading,
 ) -> Request:
     """The request of `fill`. Raises RequestError when it does not fit the clip or nothing is missing."""
-    chosen = split_names(joints) or None
-    if joints and not chosen:
-        raise RequestError(
-            "--joints names no joint", "nothing follows it", "Write --joints LeftArm,LeftHand."
-        )
-    chosen = chosen and full_names(chosen, clip)
+    chosen = joints_of(joints, clip)
     listed = [Gap.parse(text, chosen, clip) for text in ranges]
     if gaps is not None:
         if chosen and not ranges:
