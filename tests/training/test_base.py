@@ -198,7 +198,9 @@ def test_every_task_is_drawn_and_leaves_something_to_go_by():
     assert any(task.noisy.any() for task in seen)
     alone = draw_task(rng, BaseSettings(tasks="gap"), 8).known
     assert (alone == alone[:1]).all()
-    assert set(TASKS) == {"all", "gap"}
+    assert set(TASKS) == {"all", "parts", "gap"}
+    assert TASKS["all"].keys() == TASKS["parts"].keys()
+    assert all(sum(odds.values()) == pytest.approx(1) for odds in TASKS.values())
 
 
 def test_a_width_that_heads_do_not_share(walk_pack):
