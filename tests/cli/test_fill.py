@@ -536,6 +536,9 @@ def test_joints_of_another_clip_are_laid_over_the_motion_that_is_there(run, take
     assert again.code == 0
     assert Path("again.bvh").read_bytes() == Path("take.filled.bvh").read_bytes()
     assert "no other clip is named" in run("fill", "take.bvh", "--layer").err
+    over = run("fill", "take.bvh", *part, "--layer", "-o", "jump.bvh", "--force", "--dry-run")
+    assert "it is the input" in over.out
+    assert over.code == 2
 
 
 def test_times_in_seconds_and_where_joints_are(run, take):

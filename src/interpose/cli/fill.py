@@ -208,7 +208,8 @@ def _dry_run(
     jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
     code, ends = 4 if request.left or any(job.method is None for job in jobs) else 0, ""
     try:
-        outputs.check(file, force, gaps)
+        for read in (file, *(one.file for one in request.parts)):
+            outputs.check(read, force, gaps)
     except RequestError as error:
         code, ends = error.exit_code, f"{error.what}; {error.why}. {error.fix}"
     if as_json:
