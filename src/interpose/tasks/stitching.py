@@ -121,7 +121,7 @@ def cycle(clip: Clip) -> Cycle:
     if found is None:
         raise RequestError(
             f"no part of {clip.name or 'the clip'} goes round",
-            "in none of its poses it is nearly as it was half a second to eight seconds before",
+            "no pose of it is like one that was there half a second to eight seconds before",
             "Leave out --trim: then a way back to the beginning is generated.",
         )
     begin, end, apart = found
