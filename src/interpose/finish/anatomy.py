@@ -16,6 +16,7 @@ from interpose.clip import Clip
 from interpose.finish.span import Span, write
 from interpose.finish.windows import rounded
 from interpose.geometry import rotations
+from interpose.geometry.ground import UP
 from interpose.geometry.time import hermite, runs
 from interpose.methods.classical import Spline
 from interpose.observation import Observation
@@ -44,7 +45,6 @@ SPREADS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, np.inf)
 # the whole body stands still.
 LOCKED, MOVING = 1e-6, 0.5
 LEGS = [(JOINTS.index(side + "UpLeg"), JOINTS.index(side + "Leg")) for side in ("Left", "Right")]
-DOWN, UP = np.array([0.0, -1.0, 0.0]), np.array([0.0, 1.0, 0.0])
 
 
 def knees(turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -54,8 +54,8 @@ def knees(turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """
     thighs, shins = (turned[:, list(rows)] for rows in zip(*LEGS))
     bend = rotations.multiply(rotations.conjugate(thighs), shins)
-    twist = rotations.angle(rotations.twist_about(bend, UP), rotations.identity())
-    way = rotations.rotate(bend, DOWN)
+    twist = rotations.angle(rotations.twist_about(bend, UP.values), rotations.identity())
+    way = rotations.rotate(bend, -UP.values)
     return np.degrees(twist), np.degrees(np.arctan2(-way[..., 2], -way[..., 1]))
 
 
@@ -265,5 +265,5 @@ def _milder(one: Whirl, other: Whirl) -> bool:
 def turning(clip: Clip) -> np.ndarray:
     """(F,) radians about the vertical by which the hips have turned since the first frame, to the left."""
     turned = clip.kinematics()[0][:, hips_of(clip.skeleton)]
-    steps = rotations.twist_about(rotations.multiply(turned[1:], rotations.conjugate(turned[:-1])), UP)
+    steps = rotations.twist_about(rotations.multiply(turned[1:], rotations.conjugate(turned[:-1])), UP.values)
     return np.concatenate([[0.0], np.cumsum(rotations.log(steps)[:, 1])])

@@ -46,7 +46,7 @@ SKIDS, SLIDES = 3.0, 15.0
 # between two keys takes 21 cm/s in truth.
 UNSEEN = 30.0
 # Metres by which a foot drifts in one stance, and twice as far as around the gap: no real one in 64 pieces of
-# LAFAN1's validation performer does, but in 6 % of fills.
+# LAFAN1's validation performer does, but in 9 % of fills.
 DRIFTS = 0.08
 # Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
 ROUND = 30.0

@@ -11,6 +11,7 @@ from interpose.geometry.constant import Constant
 
 Array = Any
 FLOOR = Constant([1.0, 0.0, 1.0])  # what of a place is on the floor
+UP = Constant([0.0, 1.0, 0.0])
 
 
 def wrap(angles: Array) -> Array:

@@ -117,22 +117,22 @@ def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
 
     The two that are most alike, from SHORTEST to ROUND seconds apart. None where nothing comes back.
     """
+    least, most = max(1, round(SHORTEST * clip.fps)), min(round(ROUND * clip.fps), len(clip) - 1)
+    if least > most:
+        return None
     placed = body.positions(clip)
     hips = placed[:, :1] * FLOOR.values
     faces = np.unwrap(facing(placed))
     around = turn(placed - hips, -faces[:, None])
-    ways = turn(np.gradient(hips[:, 0], axis=0), -faces) if len(clip) > 1 else np.zeros((len(clip), 3))
-    paces = AHEAD * clip.fps * (np.gradient(around, axis=0) + ways[:, None]) if len(clip) > 1 else around
+    ways = turn(np.gradient(hips[:, 0], axis=0), -faces)
+    paces = AHEAD * clip.fps * (np.gradient(around, axis=0) + ways[:, None])
     seen = np.concatenate([around, paces], axis=1)
-    least, most = round(SHORTEST * clip.fps), min(round(ROUND * clip.fps), len(clip) - 1)
-    best: tuple[float, int, int] | None = None
+    best = (np.inf, 0, 0)
     for lag in range(least, most + 1):
         apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
         apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
         at = int(apart.argmin())
-        best = min(best or (np.inf, 0, 0), (float(apart[at]), at, at + lag))
-    if best is None:
-        return None
+        best = min(best, (float(apart[at]), at, at + lag))
     # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
     usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
     return None if best[0] > CLOSES * usual else (best[1], best[2], best[0])

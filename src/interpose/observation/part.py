@@ -10,10 +10,10 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.geometry import rotations
+from interpose.geometry.ground import UP
 from interpose.observation.observation import Observation, frame_number
 from interpose.skeletons.carrier import hips_of
 
-UP = np.array([0.0, 1.0, 0.0])
 SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
 
 
@@ -82,8 +82,8 @@ def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part
     here = clip.slice(to.start, to.stop).kinematics()[0]
     there = part.clip.slice(part.start, part.stop).kinematics()[0]
     other = part.clip.skeleton
-    mine = rotations.twist_about(here[:, hips], UP)
-    theirs = rotations.twist_about(there[:, hips_of(other)], UP)
+    mine = rotations.twist_about(here[:, hips], UP.values)
+    theirs = rotations.twist_about(there[:, hips_of(other)], UP.values)
     between = rotations.multiply(mine, rotations.conjugate(theirs))
     for joint in tops:
         aims = rotations.multiply(between, there[:, other.index(skeleton.names[joint])])

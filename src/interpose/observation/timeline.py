@@ -14,7 +14,7 @@ import numpy as np
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.geometry.ground import turn, wrap
+from interpose.geometry.ground import UP, turn, wrap
 from interpose.geometry.time import resample
 from interpose.observation.gait import in_step
 from interpose.observation.observation import Gap
@@ -345,7 +345,7 @@ def end(body: Humanoid, clip: Clip, frame: int) -> End:
     way = (places[-1] - places[0]) * [1.0, 0.0, 1.0]
     velocity = way / max(len(part) - 1, 1) * clip.fps
     if not body.mapping.usable:
-        root = rotations.twist_about(part.kinematics()[0][frame, hips], np.array([0.0, 1.0, 0.0]))
+        root = rotations.twist_about(part.kinematics()[0][frame, hips], UP.values)
         return End(places[frame], velocity, float(2 * np.arctan2(root[2], root[0])))
     course = float(facing(body.positions(part.slice(0, len(part)))[frame]) * body.hand[0])
     travel = float(np.arctan2(velocity[0], velocity[2]))

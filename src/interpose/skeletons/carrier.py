@@ -12,13 +12,13 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
+from interpose.geometry.ground import UP
 from interpose.skeletons.mapping import find_mapping
 
 NEAR = 0.3  # metres over the floor within which a root stays that goes along with the hips
 STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
 # What of a root's height (metres) changes, and what points up at it leans (radians), at most, is none.
 LEVEL, LEANS = 2e-3, 2e-3
-UP = np.array([0.0, 1.0, 0.0])
 
 
 def hips_of(skeleton: Skeleton) -> int:
@@ -111,11 +111,11 @@ def rooted(clip: Clip, known: np.ndarray) -> Clip:
 def _upright(turned: np.ndarray, known: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Rotations (F, 4), those that are `free` (F,) brought upright if all that are `known` are."""
     # What points up in the first known frame points up in all of them, if it turns about the vertical alone.
-    up = rotations.rotate(rotations.conjugate(turned[known][0]), UP)
+    up = rotations.rotate(rotations.conjugate(turned[known][0]), UP.values)
     ways = rotations.rotate(turned, np.broadcast_to(up, (len(turned), 3)))
-    if (np.linalg.norm(ways[known] - UP, axis=-1) > LEANS).any():
+    if (np.linalg.norm(ways[known] - UP.values, axis=-1) > LEANS).any():
         return turned
-    back = rotations.between(ways, np.broadcast_to(UP, ways.shape))
+    back = rotations.between(ways, np.broadcast_to(UP.values, ways.shape))
     return np.where(free[:, None], rotations.normalize(rotations.multiply(back, turned)), turned)
 
 
