@@ -12,11 +12,11 @@ from interpose.observation.gapfile import EXAMPLE, read_gaps
 
 
 @pytest.fixture
-def read(tmp_path):
+def read(tmp_path, cmu_walk):
     def read(content: object) -> list[Gap]:
         path = tmp_path / "gaps.json"
         path.write_text(content if isinstance(content, str) else json.dumps(content), encoding="utf-8")
-        return read_gaps(path)
+        return read_gaps(path, cmu_walk)
 
     return read
 
@@ -26,15 +26,17 @@ def test_every_way_to_write_a_gap(read):
         {"frames": "120:160"},
         {"frames": [200, 230], "joints": ["LeftArm", "LeftHand"]},
         {"start": 5, "stop": 9, "joints": None},
+        {"frames": "1s:1.5s"},
+        {"frames": "200:"},
     ]
-    gaps = [Gap(120, 160), Gap(200, 230, ("LeftArm", "LeftHand")), Gap(5, 9)]
+    gaps = [Gap(120, 160), Gap(200, 230, ("LeftArm", "LeftHand")), Gap(5, 9), Gap(30, 45), Gap(200, 209)]
     assert read(entries) == gaps
     assert read({"gaps": entries, "comment": "by hand"}) == gaps
     assert read([]) == []
 
 
 def test_the_example_in_the_messages_is_right(read):
-    assert read(EXAMPLE) == [Gap(120, 160), Gap(200, 230, ("LeftArm",))]
+    assert read(EXAMPLE) == [Gap(120, 160), Gap(120, 159), Gap(200, 230, ("LeftArm",))]
 
 
 def test_a_report_can_be_replayed(read):
@@ -73,9 +75,9 @@ def test_files_without_gaps_are_refused(read, content):
         read(content)
 
 
-def test_missing_binary_and_folder(tmp_path):
+def test_missing_binary_and_folder(tmp_path, cmu_walk):
     binary = tmp_path / "binary.json"
     binary.write_bytes(bytes(range(256)))
     for path in (binary, tmp_path, tmp_path / "nowhere.json"):
         with pytest.raises(FileError, match="cannot read"):
-            read_gaps(path)
+            read_gaps(path, cmu_walk)

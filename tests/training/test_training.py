@@ -250,7 +250,14 @@ def test_the_plain_recipe_draws_no_noise(pack, tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_run_that_is_stopped_saves_the_step_that_it_was_at(pack, tmp_path, monkeypatch, number):
-    """And once it is over signals do again what they did before."""
+    """And once it is over signals do again what they did before, beginning with this one."""
+
+    class Ended(BaseException):
+        pass
+
+    def end(number, frame):  # type: ignore[no-untyped-def]
+        raise Ended
+
     drawn = []
 
     def draw(self, *args):  # type: ignore[no-untyped-def]
@@ -260,13 +267,13 @@ def test_a_run_that_is_stopped_saves_the_step_that_it_was_at(pack, tmp_path, mon
         return windows_draw(self, *args)
 
     windows_draw = Windows.draw
-    before = signal.signal(number, signal.default_int_handler)
+    before = signal.signal(number, end)
     try:
         monkeypatch.setattr(Windows, "draw", draw)
         monkeypatch.setattr(cae, "fit_normaliser", lambda *args: drawn.append(args))
-        with pytest.raises(KeyboardInterrupt):
+        with pytest.raises(Ended):
             train_cae([pack], tmp_path, Budget.parse("50steps"), CaeSettings(length=32, batch=2), say=str)
-        assert signal.getsignal(number) is signal.default_int_handler
+        assert signal.getsignal(number) is end
     finally:
         signal.signal(number, before)
     assert torch.load(tmp_path / "checkpoint.pt", weights_only=False)["steps"] == 3
@@ -295,6 +302,27 @@ def test_a_run_from_shipped_weights_begins_with_them_and_keeps_their_history(pac
     assert new.auto == card.auto, "thresholds stay as measured on performers that were held out then"
     log = [json.loads(line) for line in (tmp_path / "out" / "log.jsonl").read_text().splitlines()]
     assert [entry["step"] for entry in log] == sorted(entry["step"] for entry in log)
+
+
+def test_a_run_from_shipped_weights_does_not_draw_what_they_were_trained_on_again(
+    pack, tmp_path, monkeypatch
+):
+    """Though its seed is the same."""
+    drawn: list[torch.Tensor] = []
+    monkeypatch.setattr(cae, "fit_normaliser", lambda *args: None)
+
+    def draw(self, *args):  # type: ignore[no-untyped-def]
+        drawn.append(windows_draw(self, *args))
+        return drawn[-1]
+
+    windows_draw = Windows.draw
+    monkeypatch.setattr(Windows, "draw", draw)
+    settings = CaeSettings(length=64, batch=2, learning_rate=1e-9)
+    for folder, start in (("new", None), ("on", weights.find("cae"))):
+        train_cae([pack], tmp_path / folder, Budget.parse("1steps"), settings, start=start, say=str)
+    first, other = drawn[0], drawn[len(drawn) // 2]
+    assert first.shape == other.shape
+    assert not torch.equal(first, other)
 
 
 def test_gradients_of_narrow_deconvolutions_do_not_depend_on_what_lies_in_memory():

@@ -101,7 +101,7 @@ def from_options(
             why = f"it is of a clip of {content['frames']} frames, and {file} has {len(clip)}"
             fix = f"Repeat it on {content.get('input', 'its own clip')}, or name the gaps with --gap."
             raise RequestError(f"{gaps} does not fit", why, fix)
-        filled = read_gaps(gaps)
+        filled = read_gaps(gaps, clip)
         if is_report(content) and listed:
             why = f"{gaps} is a report, which is repeated as it is: gaps, methods and seed"
             fix = f"Leave --gap out; or write all gaps, those of {gaps} too, as --gap or into a list of gaps."

@@ -6,20 +6,21 @@ import json
 from pathlib import Path
 from typing import Any
 
+from interpose.clip import Clip
 from interpose.errors import FileError, RequestError
 from interpose.observation.observation import Gap
 
-EXAMPLE = '[{"frames": "120:160"}, {"frames": [200, 230], "joints": ["LeftArm"]}]'
+EXAMPLE = '[{"frames": "120:160"}, {"frames": "4s:5.3s"}, {"frames": [200, 230], "joints": ["LeftArm"]}]'
 KEYS = {"frames", "start", "stop", "joints"}
 
 
-def read_gaps(path: str | Path) -> list[Gap]:
-    """The gaps of a JSON file.
+def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
+    """The gaps that a JSON file says a clip has.
 
     The file holds a list of entries, or an object whose "gaps" is one. An entry says its range as
-    "frames": "120:160", as "frames": [120, 160], or as "start" and "stop"; "joints" (names, or null) is left
-    out for the whole pose. The report beside a filled clip is such a file: what else stands in it is passed
-    over, which replays the run.
+    "frames": "120:160", in seconds or open-ended as for Gap.parse, as "frames": [120, 160], or as "start"
+    and "stop"; "joints" (names, or null) is left out for the whole pose. The report beside a filled clip is
+    such a file: what else stands in it is passed over, which replays the run.
 
     Raises FileError naming the entry that cannot be understood. Whether ranges and joints fit a clip shows
     only with the clip: see Observation.from_gaps.
@@ -43,11 +44,11 @@ def read_gaps(path: str | Path) -> list[Gap]:
     if not isinstance(entries, list):
         why = 'expected a list of gaps, or an object with a list under "gaps"'
         raise FileError(f"there are no gaps in {path}", why, f"Write {EXAMPLE}")
-    return [_gap(entry, f"gap number {number} in {path}") for number, entry in enumerate(entries, 1)]
+    return [_gap(entry, clip, f"gap number {number} in {path}") for number, entry in enumerate(entries, 1)]
 
 
-def _gap(entry: Any, where: str) -> Gap:
-    """One entry; `where` names it in errors."""
+def _gap(entry: Any, clip: Clip, where: str) -> Gap:
+    """One entry of a clip; `where` names it in errors."""
 
     def bad(why: str) -> FileError:
         shown = json.dumps(entry)
@@ -70,14 +71,14 @@ def _gap(entry: Any, where: str) -> Gap:
         frames = entry["frames"]
         if isinstance(frames, str):
             try:
-                return _sound(Gap.parse(frames, joints), bad)
+                return _sound(Gap.parse(frames, joints, clip), bad)
             except RequestError as error:
                 raise bad(error.why) from None
         pair = frames if isinstance(frames, list) else []
     else:
         pair = [entry.get("start"), entry.get("stop")]
     if len(pair) != 2 or not all(type(frame) is int for frame in pair):
-        raise bad('"frames" is "START:STOP" or [START, STOP], with whole numbers')
+        raise bad('"frames" is "START:STOP", in frames or seconds, or [START, STOP], with whole numbers')
     return _sound(Gap(pair[0], pair[1], joints), bad)
 
 

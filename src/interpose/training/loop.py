@@ -124,10 +124,11 @@ class Opponent:
 
 
 class Stop:
-    """Whether somebody asked to stop: SIGINT or SIGTERM. Once more, and what happened before happens."""
+    """The signal by which somebody asked to stop, SIGINT or SIGTERM, or 0. Once more, and what happened
+    before happens."""
 
     def __init__(self) -> None:
-        self.asked = False
+        self.asked = 0
         self._before: dict[int, Any] = {}
         # Of several processes one could stop a step before the others, which would wait for it.
         alone = processes() == 1 and threading.current_thread() is threading.main_thread()
@@ -137,7 +138,7 @@ class Stop:
                     self._before[number] = signal.signal(number, self._ask)
 
     def _ask(self, number: int, _: Any) -> None:
-        self.asked = True
+        self.asked = number
         self.over()
 
     def over(self) -> None:
@@ -233,6 +234,8 @@ class Trainer:
         """
         if start:
             self.follow(start)
+            # Else weights that were trained with the same seed would learn from the same batches once more.
+            self.rng = np.random.default_rng([self.settings.seed, rank(), start.training.get("steps", 0)])
         self.say(what)
         if self.resume():
             self.say(f"goes on at {100 * self.budget.fraction:.0f} % of the budget")
@@ -273,7 +276,8 @@ class Trainer:
     def run(self) -> nn.Module:
         """Train until the budget is spent; the averaged model comes back.
 
-        Asked to stop, by Ctrl-C or a signal to terminate, it ends the step and saves; KeyboardInterrupt.
+        Asked to stop, by Ctrl-C or a signal to terminate, it ends the step and saves; then the signal does
+        what it does without a run: KeyboardInterrupt, or the end of the process.
         """
         if rank() == 0:
             kept = {
@@ -295,7 +299,8 @@ class Trainer:
         finally:
             stop.over()
         if stop.asked:
-            raise KeyboardInterrupt
+            signal.raise_signal(stop.asked)
+            raise KeyboardInterrupt  # for those who ignore the signal now
         if dist.is_initialized():
             dist.barrier()
         return self.averaged
