@@ -157,13 +157,11 @@ def test_methods_of_single_gaps(cmu_walk):
 
 
 def test_auto_goes_by_length_and_by_what_the_network_can(cmu_walk):
-    card = weights.find("small")
-    short, long = max(1, card.auto["from_gap"] - 1), card.auto["from_gap"] + 1
-    further = card.max_gap + 1
-    names = [job.method.name for length in (short, long, further) for job in _plan(cmu_walk, length)]
-    assert names[2] == "small"
-    if 1 < card.auto["from_gap"] < card.max_gap:
-        assert names[:2] == ["spline", "small"]
+    base, small = (weights.find(name) for name in ("base", "small"))
+    short = min(card.auto["from_gap"] for card in (base, small)) - 1
+    lengths = (short, base.auto["from_gap"], base.max_gap + 1)
+    names = [job.method.name for length in lengths for job in _plan(cmu_walk, length)]
+    assert names == ["spline", "base", "base"]
 
 
 def _plan(clip, length):  # type: ignore[no-untyped-def]
@@ -185,17 +183,17 @@ def test_a_lost_joint_does_not_keep_the_network_from_a_gap(long_walk):
 def test_a_pose_that_is_lost_beside_a_lost_arm_keeps_the_network(cmu_walk, whole):
     """Neither is the gap too short for it, nor is the hand, lost on both sides, at a seam there."""
     done = tasks.fill(cmu_walk, [Gap(80, 120, ("LeftArm", "LeftForeArm", "LeftHand")), Gap(*whole)])
-    assert {gap.method for gap in done.report.gaps} == {"small"}
+    assert {gap.method for gap in done.report.gaps} == {"base"}
 
 
 def test_long_gaps_and_forecasts_keep_walking():
     """Said at once, what is far from known frames is a mean that hardly moves, and glides."""
     walk = load(resources.files("interpose") / "examples" / "walk.bvh")
     filled = tasks.fill(walk, [Gap(15, len(walk) - 15)]).report.gaps[0]
-    assert filled.stop - filled.start > weights.find("small").max_gap
+    assert filled.stop - filled.start > weights.find("base").max_gap
     ahead = tasks.forecast(walk, 90).samples[0].report.gaps[0]
     for gap in (filled, ahead):
-        assert (gap.method, gap.model) == ("small", "small")
+        assert (gap.method, gap.model) == ("base", "base")
         assert gap.liveliness > 0.6
         assert gap.gliding < 0.1
 
@@ -419,22 +417,22 @@ def test_auto_takes_networks_at_any_length_where_keys_are_lone(cmu_walk):
         seen = Observation.from_gaps(cmu_walk, [Gap(*gap) for gap in gaps])
         return [job.method.name for job in tasks.plan(cmu_walk, seen, "auto", None, None, {})]
 
-    assert methods((10, 40), (41, 80)) == ["small", "small"], "motion on one side of each"
-    assert methods((10, 40), (41, 80), (81, 120)) == ["small"] * 3
-    assert methods((10, 40), (42, 80)) == ["small", "small"]
-    assert methods((1, 3), (4, 6)) == ["small", "spline"], "a key at the start, and motion after the last gap"
-    assert methods((1, 126), (127, 140)) == ["small", "small"], "between keys that are half a turn apart"
-    assert [gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps] == ["small", "small"]
+    assert methods((10, 40), (41, 80)) == ["base", "base"], "motion on one side of each"
+    assert methods((10, 40), (41, 80), (81, 120)) == ["base"] * 3
+    assert methods((10, 40), (42, 80)) == ["base", "base"]
+    assert methods((1, 3), (4, 6)) == ["base", "spline"], "a key at the start, and motion after the last gap"
+    assert methods((1, 126), (127, 140)) == ["base", "base"], "between keys that are half a turn apart"
+    assert [gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps] == ["base", "base"]
 
 
 def test_half_a_turn_between_lone_keys_takes_the_time_there_is(cmu_walk):
-    """Seen from either way round it is as far; `small` would snap."""
+    """Seen from either way round it is as far; a network alone would snap."""
     pose, body = cmu_walk.slice(0, 1), find_humanoid(cmu_walk)
     for degrees in (100, 175):
         yaw = np.radians(degrees)
         there = timeline.Placement(yaw, tuple(pose.root[0] - turn(pose.root[0], np.array(yaw)))).of(pose)
         done = tasks.between(tasks.block({0: pose, 46: there}), [0, 46])
-        assert done.report.gaps[0].method == "small"
+        assert done.report.gaps[0].method == "base"
         faces = np.unwrap(facing(body.positions(done.clip)))
         assert np.degrees(np.abs(np.diff(faces))).max() * cmu_walk.fps < 330
 

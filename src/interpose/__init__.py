@@ -280,7 +280,7 @@ def between(
         clip: a clip, or the path of one. Its poses between the keys have no influence; what lies before the
             first and after the last key stays as it is.
         keys: frame numbers, two or more.
-        action: what the motion is ("walk", ...), for methods that know actions: "small" and "cmib".
+        action: what the motion is ("walk", ...), for methods that know actions: "base", "small" and "cmib".
         method, seed, progress, path, pins: as in `fill`.
 
     Returns and raises what `fill` does; RequestError also for keys with nothing between them and for an

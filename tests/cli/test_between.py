@@ -27,7 +27,7 @@ def test_keys_come_back_and_the_rest_is_new(run, take):
 def test_an_action_is_told_to_what_fills_best_and_is_replayed(run, take):
     done = run("between", "take.bvh", "--keys", "10,40,90", "--action", "walk", "--json")
     assert done.json["method"] == "auto"
-    assert {gap["method"] for gap in done.json["gaps"]} == {"small"}
+    assert {gap["method"] for gap in done.json["gaps"]} == {"base"}
     assert done.json["action"] == "walk"
     again = run("fill", "take.bvh", "--gaps", "take.between.json", "-o", "again.bvh")
     assert again.code == 0

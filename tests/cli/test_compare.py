@@ -12,11 +12,11 @@ def test_methods_are_played_together_and_measured(run, take):
     done = run("compare", "take.bvh", "--gap", "60:90")
     assert done.code == 0
     page = take.with_name("take.compared.html").read_text()
-    for name in ("spline", "small", "cae", "cmib", "input"):
+    for name in ("spline", "base", "small", "cae", "cmib", "input"):
         assert f'"{name}"' in page
     lines = [line.split() for line in done.out.splitlines() if "60:90  " in line]
-    assert [line[4] for line in lines] == ["spline", "small", "cae", "cmib"]
-    assert "small *" in done.out, "what auto takes"
+    assert [line[4] for line in lines] == ["spline", "base", "small", "cae", "cmib"]
+    assert "base *" in done.out, "what auto takes"
     assert "interpose fill take.bvh --gap 60:90 --method NAME" in done.out
     assert take.read_bytes() == before
     assert not list(take.parent.glob("*.json"))
@@ -25,7 +25,7 @@ def test_methods_are_played_together_and_measured(run, take):
 def test_each_does_what_fill_does_by_it(run, take):
     told = run("compare", "take.bvh", "--gap", "60:90", "--methods", "linear,spline", "--json").json
     assert [one["method"] for one in told["compared"]] == ["linear", "spline"]
-    assert told["auto"] == {"1": "small"}
+    assert told["auto"] == {"1": "base"}
     for one in told["compared"]:
         filled = run(
             "fill", "take.bvh", "--gap", "60:90", "--method", one["method"], "--json", "--force"
@@ -41,7 +41,7 @@ def test_what_does_not_fill_a_gap_is_left_out(run, take):
     assert done.code == 0
     assert "cmib is left out" in done.out
     done = run("compare", "take.bvh", *gap, "--methods", "cmib", "--force")
-    assert "cmib (by small)" in done.out
+    assert "cmib (by base)" in done.out
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ def test_a_map_lets_the_network_fill_a_strange_skeleton_and_a_report_remembers_i
     roles = {name: own[joint] for name, joint in joints.items()}
     (tmp_path / "map.json").write_text(json.dumps({"joints": roles}))
     mapped = ("fill", strange, "--gap", "60:90", "--map", "map.json", "-o", "mapped.bvh", "--json")
-    assert run(*mapped).json["gaps"][0]["method"] == "small"
+    assert run(*mapped).json["gaps"][0]["method"] == "base"
     (tmp_path / "map.json").unlink()
     assert run("fill", strange, "--gaps", "mapped.json", "-o", "again.bvh").code == 0
     assert (tmp_path / "again.bvh").read_bytes() == (tmp_path / "mapped.bvh").read_bytes()

@@ -41,7 +41,7 @@ def test_three_takes_on_one_timeline(run, takes):
     for gap in report["gaps"]:
         assert gap["seam_after"] <= gap["seam_limit"]
     assert "<html" in (takes / "walk.stitched.html").read_text()
-    assert "small: for research and non-commercial use" in done.out
+    assert "base: for research and non-commercial use" in done.out
 
 
 def test_the_report_says_where_a_clip_lies(run, takes):
@@ -85,7 +85,7 @@ def test_unaligned_takes_keep_their_place(run, takes):
 def test_an_action_is_told(run, takes):
     report = run("stitch", "walk.bvh", "run.bvh", "--frames", "30", "--action", "run", "--json").json
     assert report["action"] == "run"
-    assert {gap["method"] for gap in report["gaps"]} == {"small"}, "amid motion it needs less of a hint"
+    assert {gap["method"] for gap in report["gaps"]} == {"base"}, "amid motion it needs less of a hint"
 
 
 @pytest.mark.parametrize(

@@ -58,8 +58,8 @@ def test_methods_see_the_context_and_the_truth_scores_zero(published, monkeypatc
 
 def test_a_single_frame_beside_a_gap_is_a_key(published):
     (window,) = windows(published, ("lafan1",), "validation", most=1)
-    assert context._method("auto", window, Gap(1, 3)).name == "small"
-    assert context._method("auto", window, Gap(5, 45)).name == "small"
+    assert context._method("auto", window, Gap(1, 3)).name == "base"
+    assert context._method("auto", window, Gap(5, 45)).name == "base"
     assert context._method("auto", window, Gap(5, 8)).name == "spline"
 
 

@@ -32,7 +32,7 @@ def test_only_open_weights_where_that_is_asked_for(walk):
     """What chooses by itself chooses among them, and a method with others is refused."""
     gap = second(walk)
     arm = Gap(gap.start, gap.stop, ("LeftArm", "LeftForeArm"))
-    assert auto.choose(walk, gap)[0].name == auto.choose(walk, arm)[0].name == "small"
+    assert auto.choose(walk, gap)[0].name == auto.choose(walk, arm)[0].name == "base"
     with interpose.license("open"):
         assert auto.choose(walk, gap, lone=2)[0].name == "small-open"
         # Shorter gaps than it is good at are the spline's: nothing to be said of that.
@@ -40,13 +40,13 @@ def test_only_open_weights_where_that_is_asked_for(walk):
         assert (method.name, why) == ("spline", None)
         done = interpose.fill(walk, arm)
         assert (done.report.gaps[0].method, done.report.gaps[0].model) == ("small-open", "small-open")
-        with pytest.raises(RequestError, match="small are not open") as refused:
-            interpose.fill(walk, gap, method="small")
+        with pytest.raises(RequestError, match="base are not open") as refused:
+            interpose.fill(walk, gap, method="base")
         assert "research" in refused.value.why
         assert "small-open or spline" in refused.value.fix
         with pytest.raises(RequestError, match="cae are not open"):
             interpose.fill(walk, gap, method=str(ROOT / "weights" / "cae"))
-    assert auto.choose(walk, gap)[0].name == "small"
+    assert auto.choose(walk, gap)[0].name == "base"
 
 
 def test_the_licence_holds_in_all_threads_and_ends_with_whoever_asked(walk):
@@ -59,7 +59,7 @@ def test_the_licence_holds_in_all_threads_and_ends_with_whoever_asked(walk):
         assert others.submit(chosen).result() == "small-open"
         with interpose.license("any"):
             assert chosen() == "small-open", "who asks for less does not get more"
-    assert chosen() == "small"
+    assert chosen() == "base"
 
 
 def test_unknown_licences_list_the_known_ones():

@@ -30,7 +30,7 @@ from interpose.models.base import (  # noqa: E402
 )
 from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
-from interpose.skeletons import PARENTS, find_mapping  # noqa: E402
+from interpose.skeletons import JOINTS, PARENTS, find_mapping  # noqa: E402
 from interpose.training import graphs  # noqa: E402
 from interpose.training.base import (  # noqa: E402
     JUDGED,
@@ -278,8 +278,8 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
                 value.copy_(value.half())
         expected = model(*(v.float() if v.is_floating_point() else v for v in given))
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-    label = int(given[5][0])
-    (said,) = method.run(card.onnx, method.Seen(local, root, known == 1, (label, 0), bones, pinned, pins))
+    actions = (card.labels[int(given[5][0])], "")
+    (said,) = method.run(card, method.Seen(local, root, known == 1, actions, bones, pinned, pins))
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
@@ -301,7 +301,7 @@ def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
         sizes.append(path.stat().st_size)
         local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-        said += method.run(path, method.Seen(local, root, known == 1, (0, 0), bones, pinned, pins))
+        said += method.run(of(path), method.Seen(local, root, known == 1, ("", ""), bones, pinned, pins))
         for exact in (False, True) if files == 1 else (False,):
             again = Base(TINY)
             restore(again, path)
@@ -333,6 +333,36 @@ def test_it_completes_clips(trained, cmu_walk, monkeypatch):
         small.for_action("fly")
 
 
+def of(path):  # type: ignore[no-untyped-def]
+    """The card of a graph."""
+    labels, joints = ["", "walk"], list(JOINTS)
+    card = weights.Card(path.stem, "small", "", "", [], [], joints, 30.0, 120, labels=labels)
+    return replace(card, path=path.with_suffix(".json"))
+
+
+def test_weights_that_are_asked_beside_others_count_as_much(model, given, tmp_path):
+    """And an action that they do not know is none to them; what is known stays exactly."""
+    cards = []
+    for seed in (1, 2):
+        other = copy.deepcopy(model).float()
+        torch.manual_seed(seed)
+        torch.nn.init.normal_(other.encoder.label.weight, std=1.0)
+        graphs.export_base_onnx(other, tmp_path / f"{seed}.onnx")
+        cards.append(of(tmp_path / f"{seed}.onnx"))
+    one, two = cards[0], replace(cards[1], labels=["", "run"])
+    local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
+    seen = method.Seen(local, root, known == 1, ("walk", "walk"), bones, pinned, pins)
+    hole = slice(10, 30)
+    both, first = method.ask([one, two], seen, hole), method.ask([one], seen, hole)
+    second = method.ask([two], replace(seen, actions=("", "")), hole)
+    assert np.abs(first.root - second.root).max() > 1e-3
+    assert np.allclose(both.root, (first.root + second.root) / 2)
+    assert np.allclose(both.expected, (first.expected + second.expected) / 2)
+    apart = rotations.angle(first.local, second.local)
+    assert np.allclose(rotations.angle(both.local, first.local), apart / 2, atol=1e-6)
+    assert np.allclose(rotations.angle(both.local, second.local), apart / 2, atol=1e-6)
+
+
 def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_path):
     """Also where the two disagree; what is known of half a pose stays exactly."""
     path = tmp_path / "small.onnx"
@@ -342,13 +372,13 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_pat
     known[12:20, 5:9] = True
     pins = pins.copy()
     pins[15, 17] = True
-    seen = method.Seen(local, root, known, (1, 0), bones, pinned, pins)
-    once, image = method.run(path, seen)[0], method.run(path, seen.mirrored())[0]
+    seen, card = method.Seen(local, root, known, ("walk", ""), bones, pinned, pins), of(path)
+    once, image = method.run(card, seen)[0], method.run(card, seen.mirrored())[0]
     assert np.abs(once.root - image.root * [-1, 1, 1]).max() > 1e-3  # by itself it is not
     for limit in (np.pi, 0.0):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(method, "AGREE", limit)
-            said, other = method.run_both(path, seen), method.run_both(path, seen.mirrored())
+            said, other = method.run_both(card, seen), method.run_both(card, seen.mirrored())
         back = seen.mirrored()
         back.local, back.root = other.local, other.root
         back = back.mirrored()

@@ -65,7 +65,7 @@ def between(
             the last anchor on).
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
-        action: what the motion is; `interpose models small` lists what there is. A word does little: another
+        action: what the motion is; `interpose models base` lists what there is. A word does little: another
             key says more.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit; --start is frame
             0. May be repeated.

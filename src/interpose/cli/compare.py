@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from interpose.finish import Completion, GapReport
     from interpose.observation import Gap
 
-USUAL = ("spline", "small", "cae", "cmib")
+USUAL = ("spline", "base", "small", "cae", "cmib")
 COLORS = ("#2a78c2", "#d1495b", "#3a9d5d", "#c98a1b", "#7a5bb5", "#2aa4a4", "#b5467f", "#7d7f1f")
 
 
@@ -46,7 +46,7 @@ def compare(
 
     Try:
       interpose compare take.bvh --gap 120:160
-      interpose compare take.bvh --gap 120:160 --methods linear,spline,small
+      interpose compare take.bvh --gap 120:160 --methods linear,spline,base
       interpose compare take.bvh --gap 120:160 --methods small,my_weights/
 
     Args:
@@ -54,8 +54,8 @@ def compare(
         gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip.
         gaps: a JSON file of gaps.
-        methods: the methods, separated by commas; without it spline, small, cae and cmib. `interpose models`
-            lists what there is.
+        methods: the methods, separated by commas; without it spline, base, small, cae and cmib.
+            `interpose models` lists what there is.
         output: where to write the page.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.

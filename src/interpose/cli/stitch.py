@@ -88,7 +88,7 @@ def stitch(
         loop: lead back to the beginning as well, so that the motion can be played round and round.
         trim: with --loop, keep the part of the clip that goes round best already, such as one stride of a
             walk, and generate a few frames alone.
-        action: what the generated motion is; `interpose models small` lists what there is.
+        action: what the generated motion is; `interpose models base` lists what there is.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).

@@ -137,7 +137,7 @@ def own(
 
     Args:
         data: the folder with your clips.
-        from_: the weights to begin with: small, small-open, or a folder.
+        from_: the weights to begin with: small, base, small-open, or a folder.
         out: the folder for the new weights; the run goes into a folder within it, and goes on if it is there.
         budget: device time or steps: 10m, 1h, 2000steps.
         set: change a setting of the recipe: name=value. May be repeated.

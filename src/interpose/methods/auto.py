@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.methods import registry, weights
@@ -15,11 +17,11 @@ from interpose.observation import Gap
 # with `small` and 5.7 with `cmib`, two seconds apart with one more in the middle 5.7 and 5.8. One joint, or
 # three, or a limb that is lost 4.6, 6.6 and 9.4 with `small`, 8.8, 13.9 and 16.5 with `cae` (bench every).
 # `small-open` stands in where only weights for any use are installed, or asked for.
-NETWORKS, KEYS = ("small", "cae", "small-open"), ("small", "cmib", "small-open")
+NETWORKS, KEYS = ("base", "small", "cae", "small-open"), ("base", "small", "cmib", "small-open")
 # At an end of a clip, where a spline has one side alone to go by, this one is ahead at any length: in 2 and 3
 # frames joints are off by .25 and .36 cm, the spline's by .43 and .69 (at the beginning .44 and .66, .59 and
 # .96); `cae` and `small-open` are not.
-AT_ENDS = ("small",)
+AT_ENDS = ("base", "small")
 
 
 def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
@@ -51,7 +53,7 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
 
 
 def choose_told(clip: Clip, gap: Gap, action: str) -> Method:
-    """The method that is told the action: `small`, and `cmib` where it refuses or does not know the action.
+    """The method that is told the action: `base`, `small`, or `cmib` where these refuse or do not know it.
 
     Measured on LAFAN1's validation performer, in gaps of 30 and 60 frames: amid motion joints are off by 3.9
     and 9.8 cm with `small` and 7.5 and 16.7 with `cmib`; between two keys by 6.4 and 15.9, and 7.5 and 16.7.
@@ -62,7 +64,7 @@ def choose_told(clip: Clip, gap: Gap, action: str) -> Method:
     Raises RequestError for an action that none of them knows, or where none is installed.
     """
     methods: list[Method] = []
-    for name in ("small", "cmib"):
+    for name in ("base", "small", "cmib"):
         try:
             methods.append(registry.told(name, action))
         except RequestError as error:
@@ -74,9 +76,10 @@ def choose_told(clip: Clip, gap: Gap, action: str) -> Method:
 
 def instead(chosen: Method, clip: Clip, gap: Gap) -> Method:
     """What takes over where a method's motion is none of a person's: the spline, and for `cmib`, whose gaps
-    are long, between keys, `small`."""
-    try:
-        other = registry.get(KEYS[0]) if chosen.name == KEYS[1] and weights.find(KEYS[0]) else None
-    except RequestError:
-        other = None
-    return other if other is not None and other.refuses(clip, gap) is None else registry.get("spline")
+    are long, between keys, the network that is ahead of it."""
+    for name in KEYS[: KEYS.index("cmib")] if chosen.name == "cmib" else ():
+        with suppress(RequestError):
+            weights.find(name)
+            if registry.get(name).refuses(clip, gap) is None:
+                return registry.get(name)
+    return registry.get("spline")

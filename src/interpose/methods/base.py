@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
+from functools import reduce
 
 import numpy as np
 
@@ -53,15 +54,23 @@ class Base:
         name: of the weights: base, small or small-open.
         action: a label of its card; "" leaves it open.
         trained: the weights; the installed ones without any.
+        beside: the name of installed weights that are asked, too, unless others were trained: the mean of
+            what both say counts.
     """
 
     name: str = "base"
     action: str = ""
     trained: weights.Card | None = None
+    beside: str = ""
 
     @property
     def card(self) -> weights.Card:
         return weights.of(self.name, self.trained)
+
+    @property
+    def asked(self) -> list[weights.Card]:
+        """All weights that are asked, its own first."""
+        return [self.card, *([weights.find(self.beside)] if self.beside and not self.trained else [])]
 
     def for_action(self, action: str) -> Base:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
@@ -72,7 +81,7 @@ class Base:
             )
         if action not in labels:
             raise unknown("action", action, labels)
-        return Base(self.name, action, self.trained)
+        return replace(self, action=action)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: no humanoid, or joints that it does not know."""
@@ -95,16 +104,16 @@ class Base:
         before = np.floor(times).astype(int)
         after = np.minimum(np.ceil(times).astype(int), len(clip) - 1)
         local = kinematics.local_rotations(turned, PARENTS)
-        label = card.labels.index(self.action) if self.action else 0
+        across = card.labels[mirrored(card.labels)[card.labels.index(self.action)]] if self.action else ""
         seen = Seen(
             sample_rotations(local, times),
             sample(root, times),
             known[before] & known[after],
-            (label, mirrored(card.labels)[label] if label else 0),
+            (self.action, across),
             bones,
             *pinned(observation, body.mapping, times, body.scale * body.hand),
         )
-        answer = run_long(card, seen)
+        answer = run_long(self.asked, seen)
         said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
         back = np.interp(np.arange(len(clip))[missing], times, np.arange(len(times)))
@@ -139,6 +148,11 @@ class Answer:
     def backwards(self) -> Answer:
         """From its end to its beginning."""
         return Answer(self.local[::-1], self.root[::-1], self.stands[::-1], self.expected[::-1])
+
+
+def base() -> Base:
+    """The larger one, and `small` beside it: they err differently, and their mean less than either."""
+    return Base("base", beside="small")
 
 
 def small() -> Base:
@@ -198,7 +212,7 @@ class Seen:
         local: (T, 22, 4) canonical rotations relative to the parent's.
         root: (T, 3) metres, the hips.
         known: (T, 23) how far each is known: 0 not at all, 1 exactly.
-        labels: index of the action, and of that of the mirror image.
+        actions: what it is told to be, and what the mirror image is; "" for nothing.
         bones: (22, 3) metres.
         places: (T, 22, 3) metres, where joints are to be.
         pins: (T, 22) of which joints that is said.
@@ -207,7 +221,7 @@ class Seen:
     local: np.ndarray
     root: np.ndarray
     known: np.ndarray
-    labels: tuple[int, int]
+    actions: tuple[str, str]
     bones: np.ndarray
     places: np.ndarray
     pins: np.ndarray
@@ -228,15 +242,15 @@ class Seen:
             self.local[:, sides] * ACROSS_TURN.values,
             self.root * across,
             self.known[:, [*sides, len(sides)]],
-            self.labels[::-1],
+            self.actions[::-1],
             self.bones[sides] * across,
             self.places[:, sides] * across,
             self.pins[:, sides],
         )
 
 
-def run(path: Path, *motions: Seen) -> list[Answer]:
-    """Run the graph on motions of one length."""
+def run(card: weights.Card, *motions: Seen) -> list[Answer]:
+    """Run the graph of some weights on motions of one length."""
     # Far from the origin float32 would lose millimetres.
     origins = [one.root[np.argmax(one.known[:, -1])] * [1.0, 0.0, 1.0] for one in motions]
     feeds = [
@@ -251,48 +265,47 @@ def run(path: Path, *motions: Seen) -> list[Answer]:
     ]
     feed = {name: np.stack([one[name] for one in feeds]).astype(np.float32) for name in feeds[0]}
     feed["pins"] = np.stack([one.pins for one in motions])
-    feed["label"] = np.array([one.labels[0] for one in motions])
-    said = weights.session(path).run(["local_out", "root_out", "contact", "error"], feed)
+    told = [one.actions[0] for one in motions]
+    feed["label"] = np.array([card.labels.index(action) if action in card.labels else 0 for action in told])
+    said = weights.session(card.onnx).run(["local_out", "root_out", "contact", "error"], feed)
     return [
         Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
         for turned, placed, stands, off, origin in zip(*(out.astype(float) for out in said), origins)
     ]
 
 
-def run_both(path: Path, motion: Seen) -> Answer:
-    """What the graph says of a motion, in the mean with what it says of the mirror image: so the mirror image
-    of a clip is completed as the mirror image of what the clip is, and errors are 2 to 4 % smaller.
-
-    Where the two disagree by more than a right angle their mean would be neither: then the one counts that
-    expects to err less.
-    """
-    own, image = run(path, motion, motion.mirrored())
-    sides, across = list(SIDES), ACROSS.values
-    other = Answer(
-        image.local[:, sides] * ACROSS_TURN.values,
-        image.root * across,
-        image.stands[:, FEET_ACROSS],
-        image.expected,
-    )
-    apart = rotations.angle(*(kinematics.global_rotations(one.local, PARENTS) for one in (own, other)))
+def mean(one: Answer, other: Answer) -> Answer:
+    """Of two answers. Where they disagree by more than a right angle their mean would be neither: then the
+    one counts that expects to err less."""
+    apart = rotations.angle(*(kinematics.global_rotations(said.local, PARENTS) for said in (one, other)))
     if apart.max(initial=0.0) > AGREE:
-        return min(own, other, key=lambda one: float(one.expected.mean()))
+        return min(one, other, key=lambda said: float(said.expected.mean()))
     return Answer(
-        rotations.normalize(own.local + rotations.alike(other.local, own.local)),
-        *((a + b) / 2 for a, b in zip(*((x.root, x.stands, x.expected) for x in (own, other)))),
+        rotations.normalize(one.local + rotations.alike(other.local, one.local)),
+        *((a + b) / 2 for a, b in zip(*((x.root, x.stands, x.expected) for x in (one, other)))),
     )
 
 
-def ask(path: Path, motion: Seen, own: slice) -> Answer:
-    """What the graph says of a motion, for the sake of its frames `own`.
+def run_both(card: weights.Card, motion: Seen) -> Answer:
+    """What the graph says of a motion, in the mean with what it says of the mirror image: so the mirror image
+    of a clip is completed as the mirror image of what the clip is, and errors are 2 to 4 % smaller."""
+    own, image = run(card, motion, motion.mirrored())
+    sides, across = list(SIDES), ACROSS.values
+    turned = image.local[:, sides] * ACROSS_TURN.values
+    return mean(own, Answer(turned, image.root * across, image.stands[:, FEET_ACROSS], image.expected))
 
-    It has learned how motion goes on, not how it came about: where only what follows is known it goes
+
+def ask(cards: Sequence[weights.Card], motion: Seen, own: slice) -> Answer:
+    """What the graphs say of a motion in the mean, for the sake of its frames `own`.
+
+    They have learned how motion goes on, not how it came about: where only what follows is known it goes
     backwards, which errs by a third less in gaps of a second.
     """
     known = np.asarray((motion.known >= 1).all(axis=1))
-    if known[: own.start].any() or not known[own.stop :].any():
-        return run_both(path, motion)
-    return run_both(path, motion.backwards()).backwards()
+    forwards = known[: own.start].any() or not known[own.stop :].any()
+    seen = motion if forwards else motion.backwards()
+    said = reduce(mean, [run_both(card, seen) for card in cards])
+    return said if forwards else said.backwards()
 
 
 def led(motion: Seen, begin: int, end: int) -> Seen:
@@ -315,8 +328,8 @@ def steps(known: np.ndarray, begin: int, end: int, sight: int) -> tuple[int, int
     return STEP, LONE if lone and end - begin <= LONE else MEET
 
 
-def run_long(card: weights.Card, motion: Seen) -> Answer:
-    """Run the graph on a motion of any length, hole by hole.
+def run_long(cards: Sequence[weights.Card], motion: Seen) -> Answer:
+    """Run the graphs on a motion of any length, hole by hole.
 
     A hole is seen with what is around it, as far as the network can see. What a window completes is taken as
     known from then on: of single joints half of what it sees, of the whole pose STEP frames, between known
@@ -325,7 +338,7 @@ def run_long(card: weights.Card, motion: Seen) -> Answer:
     """
     local, root, known = motion.local.copy(), motion.root.copy(), motion.known.astype(float)
     motion = replace(motion, local=local, root=root, known=known)
-    frames, sight = len(root), card.max_gap
+    frames, sight = len(root), cards[0].max_gap
     stands, expected = np.full((frames, len(FEET)), np.nan), np.full(frames, np.nan)
     for begin, end in runs(np.logical_not(motion.known.all(axis=1))):
         step, last_step = steps(known, begin, end, sight)
@@ -342,7 +355,7 @@ def run_long(card: weights.Card, motion: Seen) -> Answer:
             if end - begin > last_step:
                 inside = slice(end - step, end) if backwards else slice(begin, begin + step)
             part, own = slice(first, last), slice(inside.start - first, inside.stop - first)
-            said = ask(card.onnx, motion.part(part), own)
+            said = ask(cards, motion.part(part), own)
             for held_back, new in ((stands, said.stands), (expected, said.expected)):
                 held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
             if not judged:
@@ -355,7 +368,7 @@ def run_long(card: weights.Card, motion: Seen) -> Answer:
                 expected[over] += np.linspace(near, far, over.stop - over.start)
                 carried[backwards] = float(expected[over][0 if backwards else -1])
             if astray and end - begin > sight:
-                said = ask(card.onnx, led(motion, begin, end).part(part), own)
+                said = ask(cards, led(motion, begin, end).part(part), own)
             held = known[inside] >= 1
             local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
             root[inside] = np.where(held[:, -1:], root[inside], said.root[own])

@@ -23,6 +23,7 @@ METHODS: dict[str, tuple[str, str]] = {
     "cmib": ("interpose.methods.cmib", "Cmib"),
     "stmi-gan": ("interpose.methods.stmi_gan", "StmiGan"),
     "stmi-gan-dense": ("interpose.methods.stmi_gan", "dense"),
+    "base": ("interpose.methods.base", "base"),
     "small": ("interpose.methods.base", "small"),
     "small-open": ("interpose.methods.base", "small_open"),
 }

@@ -37,7 +37,7 @@ class Card:
         tasks: the verbs that they support.
         joints: what they know, by name.
         fps: frames a second at which they think.
-        max_gap: frames at that rate that it fills at once; `small` and its like fill longer ones in steps.
+        max_gap: frames at that rate that it fills at once; `base` and its like fill longer ones in steps.
         training: recipe, seed, budget, commit, hours spent.
         metrics: measured figures with the command that printed them.
         auto: what the method `auto` goes by: from `from_gap` frames on the network is better than the spline.
