@@ -7,9 +7,11 @@ import os
 # Read by NumPy's BLAS and by torch when they are loaded, so it stands before any import of them.
 os.environ["OMP_NUM_THREADS"] = "1"
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -34,3 +36,13 @@ def cmu_walk(data: Path) -> Clip:
     from interpose import formats
 
     return formats.load(data / "cmu_walk.bvh")
+
+
+@pytest.fixture(scope="session")
+def long_walk(cmu_walk: Clip) -> Clip:
+    """The walk six times over, there and back again, so that it is continuous: 1,250 frames."""
+    there = np.arange(len(cmu_walk))
+    frames = np.concatenate([there, there[::-1]] * 3)
+    return replace(
+        cmu_walk, rotation=cmu_walk.rotation[frames], translation=cmu_walk.translation[frames], source=None
+    )

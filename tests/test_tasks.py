@@ -36,16 +36,6 @@ def _same(one: Clip, other: Clip, frames: slice) -> bool:
     )
 
 
-@pytest.fixture(scope="module")
-def long_walk(cmu_walk):  # type: ignore[no-untyped-def]
-    """The walk six times over, there and back again, so that it is continuous: 1,250 frames."""
-    there = np.arange(len(cmu_walk))
-    frames = np.concatenate([there, there[::-1]] * 3)
-    return replace(
-        cmu_walk, rotation=cmu_walk.rotation[frames], translation=cmu_walk.translation[frames], source=None
-    )
-
-
 @pytest.mark.parametrize("method", METHODS)
 def test_what_is_observed_comes_back_and_gaps_are_filled(cmu_walk, method):
     done = tasks.fill(cmu_walk, [Gap(60, 90), Gap(120, 130, ("LeftArm", "LeftForeArm"))], method)

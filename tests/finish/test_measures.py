@@ -15,6 +15,8 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 
+ARM, LEG = ("LeftArm", "LeftForeArm"), ("LeftUpLeg", "LeftLeg")
+
 
 def test_a_real_walk_is_lively_and_a_held_pose_is_not(cmu_walk):
     positions = cmu_walk.positions()
@@ -66,6 +68,14 @@ def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk):
     assert said["small"].gliding < 0.1
     glides = {m: any("it glides" in note for note in gap.notes) for m, gap in said.items()}
     assert glides == {"linear": True, "small": False}
+
+
+def test_feet_that_are_known_are_not_measured(cmu_walk):
+    """What they do beside an arm that is filled is the clip's own."""
+    arm, leg = (tasks.fill(cmu_walk, [Gap(60, 100, names)], "linear").report.gaps[0] for names in (ARM, LEG))
+    assert (arm.foot_slide, arm.foot_travel, arm.gliding) == (None, None, None)
+    assert leg.foot_slide is not None
+    assert leg.gliding is not None
 
 
 def test_a_body_that_glides_slowly_between_lone_keys_is_told(cmu_walk):

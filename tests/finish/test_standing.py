@@ -57,6 +57,22 @@ def test_hips_that_stand_still_are_found(cmu_walk):
     assert _off(done.clip, cmu_walk)[80:120].mean() < 0.03
 
 
+@pytest.mark.parametrize("others", [False, True])
+def test_hips_that_are_held_in_turn_and_place_are_recovered_in_both(cmu_walk, others):
+    """Their turn is no more to be trusted than their place; nor are those of what is held with them."""
+    stuck, names = _stuck(cmu_walk, 80, 120), cmu_walk.skeleton.names
+    held = [j for j, name in enumerate(names) if name == "Hips" or (others and "Arm" not in name)]
+    rotation = stuck.rotation.copy()
+    rotation[80:120, held] = rotation[79, held]
+    lost = stuck.with_motion(rotation, stuck.translation)
+    done = interpose.recover(lost)
+    off = np.linalg.norm(done.clip.positions() - cmu_walk.positions(), axis=-1)[80:120].mean()
+    assert off < 0.06
+    assert off < 0.25 * np.linalg.norm(lost.positions() - cmu_walk.positions(), axis=-1)[80:120].mean()
+    free = [j for j in range(len(names)) if j not in held]
+    assert np.array_equal(done.clip.rotation[:, free], cmu_walk.rotation[:, free])
+
+
 def test_a_rest_pose_beside_it_does_not_tell_where_the_body_is(cmu_walk):
     """CMU's files begin with one, at the origin."""
     rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()

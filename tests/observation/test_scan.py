@@ -107,6 +107,47 @@ def test_a_frozen_position_is_found_and_is_no_gap():
     assert to_gaps(found) == []
 
 
+def test_a_body_that_is_held_while_something_else_goes_on_is_one_finding(cmu_walk):
+    """Fingers of a glove, a prop, somebody else."""
+    walk, hips = cmu_walk.slice(1, len(cmu_walk)), cmu_walk.skeleton.index("Hips")
+    lost = [j for j, name in enumerate(walk.skeleton.names) if "Arm" not in name and "Hand" not in name]
+    for joints in ([hips], lost):
+        rotation, translation = walk.rotation.copy(), walk.translation.copy()
+        rotation[80:110, joints], translation[80:110] = rotation[79, joints], translation[79]
+        (found,) = scan(walk.with_motion(rotation, translation))
+        assert (found.kind, found.start, found.stop) == ("frozen body", 80, 110)
+        assert "Hips" in found.joints
+        assert to_gaps([found]) == []
+    assert len(found.joints) > 10
+
+
+def test_joints_that_are_held_in_the_very_frames_of_another_are_found_with_it():
+    """The arm jumps, the hand does not, which by itself would be a pause."""
+    clip = motion()
+    rotation = clip.rotation.copy()
+    rotation[40:52, 2] = rotation[39, 2]
+    rotation[52:58, 3] = rotations.slerp(rotation[39, 3], rotation[58, 3], np.linspace(0, 1, 8)[1:-1])
+    rotation[40:52, 3] = rotation[39, 3]
+    (found,) = scan(clip.with_motion(rotation, clip.translation))
+    assert spans([found]) == [("frozen", ("arm", "hand"), 40, 52)]
+
+
+@pytest.mark.parametrize("at_end", [False, True])
+def test_a_rest_pose_that_is_held_to_be_measured_is_real(cmu_walk, at_end):
+    """Though the take begins, or ended, with a cut beside it; so is the place where it stands."""
+    walk = cmu_walk.slice(1, len(cmu_walk))
+    rest = np.repeat(walk.skeleton.rest_rotation[None], 20, axis=0)
+    there = np.repeat(walk.translation[[-1 if at_end else 0]], 20, axis=0)
+    order = slice(None, None, -1 if at_end else 1)
+    rotation, translation = (
+        np.concatenate([held, moved][order])
+        for held, moved in ((rest, walk.rotation), (there, walk.translation))
+    )
+    (found,) = scan(walk.with_motion(rotation, translation))
+    assert (found.kind, found.joints, abs(len(found) - 20) <= 1) == ("still", None, True)
+    assert to_gaps([found]) == []
+
+
 @pytest.mark.parametrize("part", [slice(0, 12), slice(108, 120)])
 def test_a_body_that_stops_dead_at_an_end_is_found(part):
     """There is no jump to tell it: it never goes on."""

@@ -7,7 +7,7 @@ import pytest
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.observation.scan import scan, to_gaps
+from interpose.observation.scan import scan, stuck, to_gaps
 
 START, STOP = 80, 110
 
@@ -44,6 +44,25 @@ def test_a_limb_that_is_held_and_trembles_is_frozen(cmu_walk, limb, degrees):
     assert abs(found.start - START) <= 8
     assert found.stop == STOP
     assert to_gaps([found])
+
+
+@pytest.mark.parametrize("whole", [False, True])
+def test_what_is_held_for_long_is_found_from_its_first_frame(long_walk, whole):
+    """Seven seconds, more than a third of the clip."""
+    clip, rng, (start, stop) = long_walk.slice(0, 600), np.random.default_rng(0), (200, 410)
+    joints = [*range(len(clip.skeleton))] if whole else below(clip, "LeftArm")
+    alive = [j for j in joints if np.ptp(clip.rotation[:, j], axis=0).max() > 1e-3]
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    noise = rotations.exp(np.radians(0.1) * rng.standard_normal((stop - start, len(alive), 3)))
+    rotation[start:stop, alive] = rotations.multiply(noise, rotation[start - 1, alive])
+    if whole:
+        translation[start:stop] = translation[start - 1] + 5e-4 * rng.standard_normal((stop - start, 1, 3))
+    held = clip.with_motion(rotation, translation)
+    (found,) = [one for one in scan(held) if "frozen" in one.kind]
+    assert (found.kind, found.joints is None, found.stop) == ("frozen", whole, stop)
+    assert abs(found.start - start) <= 8
+    if whole:
+        assert not stuck(held), "its place is held as all else is, and not for `recover`"
 
 
 @pytest.mark.parametrize("limb", ["LeftArm", "RightUpLeg"])

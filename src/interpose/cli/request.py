@@ -18,7 +18,7 @@ from interpose.formats.place import vectors_inside
 from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import read_gaps
 from interpose.observation.observation import frame_at
-from interpose.observation.scan import NO_GAPS, scan, to_gaps
+from interpose.observation.scan import NO_GAPS, STUCK, scan, to_gaps
 
 EASED = 0.4  # seconds over which joints of another clip are eased in and out
 OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
@@ -140,7 +140,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     fix = "Name what is missing: --gap 120:160, --joints LeftArm or --gaps FILE.json."
     dropped = [one for one in found if one.kind == "lost"]
     sides = [one for one in found if one.kind in ("exchanged", "flipped")]
-    stuck = [one for one in found if one.kind == "frozen position"]
+    stuck = [one for one in found if one.kind in STUCK]
     others = {
         "joints that drop out for moments": dropped,
         "limbs on the wrong side": sides,

@@ -34,6 +34,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     """
     from interpose.finish.feet import legs
     from interpose.observation.scan import scan, to_gaps
+    from interpose.skeletons.carrier import place_of
 
     clip = reading.load(file)
     found = scan(clip)
@@ -94,8 +95,14 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         if jumps[0].joints is None:
             halves = " ".join(quote(f"{file}#{part}") for part in (f":{first}", f"{first}:"))
             say(f"interpose stitch {halves} --frames 2 puts what follows where the body was.")
-    if any(one.kind == "frozen position" for one in found) and legs(clip.skeleton):
+    if any(one.kind == "frozen body" for one in found):
+        say(f"interpose recover {quote(str(file))} restores a held body, its place and turns at once.")
+    body = (clip.skeleton.names[place_of(clip)],)
+    stands = [one for one in found if one.kind == "frozen position"]
+    if any(one.joints == body for one in stands) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")
+    if [one for one in stands if one.joints != body]:
+        say(f"interpose recover {quote(str(file))} leads over what else stands still.")
 
 
 def _with_below(clip: Clip, joints: tuple[str, ...]) -> list[str]:

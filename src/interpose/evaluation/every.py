@@ -23,7 +23,7 @@ from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import place_of
 
 FRAMES = 120
 LEGS = tuple(joint for limb in LIMBS for joint in limb if JOINTS[limb[0]].endswith("UpLeg"))
@@ -76,7 +76,7 @@ def _place(window: Window, length: int) -> Hidden:
     """Where the body is, in so many frames in the middle; all turns are known."""
     start = (FRAMES - length) // 2
     seen, clip = Observation.full(window.clip), window.clip
-    seen.translation[start : start + length, placed(clip)[-1]] = False
+    seen.translation[start : start + length, place_of(clip)] = False
     return Hidden((0, FRAMES), seen, np.repeat(~seen.frames[:, None], len(JOINTS), axis=1))
 
 

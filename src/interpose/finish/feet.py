@@ -94,6 +94,13 @@ def pairs(skeleton: Skeleton) -> np.ndarray:
     return np.array([leg.foot for leg in legs(skeleton)], int).reshape(-1, 2)
 
 
+def told(clip: Clip, known: Observation, start: int, stop: int) -> bool:
+    """Whether it is known where all feet are in frames start to stop - 1, or there are none: what they do
+    there is nobody's but the clip's own."""
+    joints = pairs(clip.skeleton)
+    return bool(known.slice(start, stop).positions(clip.skeleton)[:, joints.ravel()].all())
+
+
 def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:
     """(F, L, 2) the height at which each ankle and toe rests, or would: of observed stances beside a gap.
 

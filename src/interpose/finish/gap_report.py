@@ -103,9 +103,10 @@ def provenance(
 
 
 def slides(clip: Clip, known: Observation, span: Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:
-    """Slide and travel of the feet in the gaps of a span, for skeletons that have feet."""
+    """Slide and travel of the feet in the gaps of a span, where it is not known what they do."""
     lo, hi, _ = span.around(len(clip), round(feet.NEARBY * clip.fps))
     inside = [gap for gap in gaps if span.start <= gap.start and gap.stop <= span.stop]
+    inside = [gap for gap in inside if not feet.told(clip, known, gap.start, gap.stop)]
     ranges = [(gap.start - lo, gap.stop - lo) for gap in inside]
     return dict(zip(inside, feet.measure_all(clip.slice(lo, hi), known.slice(lo, hi), ranges)))
 

@@ -107,12 +107,12 @@ def _helps(finished: Clip, gap: Gap, what: str) -> str:
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:
     """The share of a gap's frames in which the body travels and no foot stands, and that of known frames
-    around it, None where too few are; None for what is too short, or has no two legs."""
+    around it, None where too few are; None for what is too short, has no two legs, or moves known ones."""
     fps, skeleton = finished.fps, finished.skeleton
     near = round(feet.NEARBY * fps)
     lo, hi = max(0, gap.start - near), min(len(finished), gap.stop + near)
     pairs, hips = feet.pairs(skeleton), hips_of(skeleton)
-    if len(pairs) < 2 or gap.stop - gap.start < fps / 2:
+    if len(pairs) < 2 or gap.stop - gap.start < fps / 2 or feet.told(finished, known, gap.start, gap.stop):
         return None
     placed, seen = finished.slice(lo, hi).positions(), known.slice(lo, hi).positions(skeleton)
     found = measures.glides(placed[:, pairs], placed[:, hips], fps, feet.size(skeleton))

@@ -4,7 +4,7 @@ drop out."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
@@ -19,7 +19,7 @@ from interpose.observation.splined import splined
 from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
 from interpose.skeletons import SIDES, find_mapping
-from interpose.skeletons.carrier import hips_of, placed
+from interpose.skeletons.carrier import hips_of, place_of, placed
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
 # trembles by 1e-4 and more; files keep about 1e-8.
@@ -47,7 +47,23 @@ EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
 # Kinds of findings that are no gaps.
-NO_GAPS = ("still", "frozen position", "splined", "lost", "exchanged", "flipped", "jump", "repeated", "noisy")
+NO_GAPS = (
+    *(
+        "still",
+        "frozen position",
+        "frozen body",
+        "splined",
+        "lost",
+        "exchanged",
+        "flipped",
+        "jump",
+        "repeated",
+    ),
+    "noisy",
+)
+STUCK = ("frozen position", "frozen body")
+APART = 3  # frames by which what is held at once may begin and end apart
+CALIBRATION = 0.5  # seconds for which a rest pose at an end is held to be measured
 
 
 @dataclass(frozen=True)
@@ -55,8 +71,8 @@ class Finding:
     """Something suspicious in a clip.
 
     Attributes:
-        kind: "missing", "frozen", "still", "frozen position", "straight", "splined", "rest pose", "outlier",
-            "lost", "exchanged", "flipped", "jump", "repeated" or "noisy".
+        kind: "missing", "frozen", "still", "frozen position", "frozen body", "straight", "splined",
+            "rest pose", "outlier", "lost", "exchanged", "flipped", "jump", "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -82,18 +98,22 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "frozen": joints whose local rotation stops changing altogether while it moves elsewhere in the clip,
       for at least .1 s (and 3 frames) with a jump at one end; or for a second in which the joint would
       usually have turned 11 degrees, away from the rest pose: a hinge at its limit has no jump, and files
-      write it as their rest pose. When everything that moves stands still at once, the root's position
-      included, it is one finding of the whole pose; of all joints that turn, when the position goes on.
+      write it as their rest pose; or in the very frames in which another does. When everything that moves
+      stands still at once, the root's position included, it is one finding of the whole pose; of all joints
+      that turn, when the position goes on.
       A limb, or its end, that hardly moves for .3 s (a joint alone for .6 s) and then is elsewhere from one
       frame to the next is frozen, too: trackers hold what they lose with the noise of what they see.
     - "still": a whole pose that stands still without a jump at either end, and that is not met or left at a
-      pace of .3 m/s: a statue, or a rest pose at the beginning. Nothing is missing.
+      pace of .3 m/s: a statue; or a rest pose of half a second at the beginning or the end, for measuring.
+      Nothing is missing.
     - "straight": joints that turn evenly for .3 s, as other programs interpolate; more than a third of all
       that move are the whole pose. Not those that do so in much of the clip: they were animated so.
     - "splined": joints that turn for .4 s along a curve smoother than anybody's motion, as programs ease or
       spline over what they miss, and as animators mend by hand: so that is no gap.
     - "frozen position": the same for a root, or hips, whose position stands still while the pose does not; or
       that stops from one frame to the next.
+    - "frozen body": the same, and the hips do not turn either, nor whichever of the listed joints, while
+      something else goes on: fingers, a prop, somebody else. `recover` restores both at once.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
     - "exchanged": arms, or legs, that have each other's turns for a while: `recover` puts them back.
@@ -127,23 +147,15 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
     turned, moved = turned[first : last - 1], moved[first : last - 1]
     findings += _frozen(clip, turned, moved, first)
     findings += _dead(clip, turned)
-    findings += _held_place(clip, findings)
+    findings = _bodies(clip, findings + _held_place(clip, findings))
     swapped, names = exchanges(clip), clip.skeleton.names
     findings += [
         Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, one.note)
         for one in swapped
     ]
     clip = put_back(clip, swapped)
-    stiff = _stiff(clip, [one for one in findings if one.kind not in NO_GAPS])
-    for whole in [one for one in stiff if one.joints is None]:
-        # The place is held as all else is.
-        within = range(whole.start - MANY, whole.stop + MANY + 1)
-        findings = [
-            one
-            for one in findings
-            if one.kind != "frozen position" or one.start not in within or one.stop not in within
-        ]
-    findings += stiff
+    stiff = _stiff(clip, findings)
+    findings = _but_whole(findings, stiff) + stiff
     repeated, brief = _repeated(turned, moved, first, clip.fps), round(HOLDS * clip.fps)
     for again in repeated:
         # What stands still for a moment, again and again, is that.
@@ -171,14 +183,16 @@ def strays(clip: Clip) -> list[int]:
 
 
 def stuck(clip: Clip) -> list[Finding]:
-    """The "frozen position" findings of `scan`: where the body is lost, and how it is turned is known."""
+    """The findings of `scan` that say where the body is lost, "frozen position" and "frozen body"."""
     if len(clip) <= 2:
         return []
     turned, moved = _steps(clip, Observation.full(clip))
     odd = {one.start for one in _strays(clip, turned)}
     first, last = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
     found = _frozen(clip, turned[first : last - 1], moved[first : last - 1], first)
-    return [one for one in found if one.kind == "frozen position"] + _held_place(clip, found)
+    found = _bodies(clip, found + _held_place(clip, found))
+    lost = [one for one in found if one.kind in STUCK]
+    return _but_whole(lost, _stiff(clip, found)) if lost else []
 
 
 def repeats(clip: Clip) -> np.ndarray:
@@ -274,9 +288,9 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         also = "the body neither, " if not len(walking) else ""
         note = f"no joint turns at all, {also}in the whole clip of {len(clip) / clip.fps:.2f} s"
         return [Finding("still", None, first, first + len(turned) + 1, note)]
-    found = []
+    found: list[Finding] = []
 
-    def add(kind: str, joints: tuple[str, ...] | None, run: Run) -> None:
+    def add(kind: str, joints: tuple[str, ...] | None, run: Run, why: str = "") -> None:
         # Steps start..stop - 1 are zero, so frames start..stop are equal. One of them is good, unless both
         # ends jump: the first, which was held, or the last where the clip begins with the run.
         begin = run.start + (0 if run.jumps_in or run.start == 0 else 1)
@@ -289,22 +303,31 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
             if to_end
             else ", and comes to rest and sets off by itself"
         )
-        note += rest if kind == "still" else ""
+        note += why or (rest if kind == "still" else "")
         found.append(Finding(kind, joints, first + begin, first + end, note))
 
     whole = np.asarray(still[:, alive].all(axis=1) & stopped[:, walking].all(axis=1))
+    stands = np.zeros(len(whole), bool)
     for run in _runs(whole, turned[:, alive].max(axis=1), JUMP_TURN):
         if run.stop - run.start >= shortest:
             begin, end = first + run.start, first + run.stop
             rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin]) < LIFELESS
             # Who stands in the rest pose does so to be measured.
-            calm = rests.mean() > 0.5 or _pace_beside(clip, begin, end) <= PACE
+            rest = rests.mean() > 0.5
+            measured = (
+                rest and end - begin >= CALIBRATION * clip.fps and (run.start == 0 or run.stop == len(turned))
+            )
+            calm = rest or _pace_beside(clip, begin, end) <= PACE
             lost = run.jumps_in or run.jumps_out or not calm
-            add("frozen" if lost else "still", None, run)
+            why = ", in the rest pose, as for measuring" if measured else ""
+            add("frozen" if lost and not measured else "still", None, run, why)
+            # Where that is, is as real.
+            stands[run.start : run.stop] |= measured
 
     # Joints without data but for some steps, like the fingers of many files, are left out.
     lively = [joint for joint in alive.tolist() if _lively(still[:, joint] & ~whole, still[:, joint])]
     together: dict[Run, list[int]] = {}
+    pauses: dict[tuple[int, int], list[int]] = {}
     turnless = still[:, lively].all(axis=1) & ~whole & (len(lively) >= MANY)
     for run in _runs(turnless, turned[:, lively].max(axis=1, initial=0.0), JUMP_TURN):
         if run.stop - run.start >= shortest:
@@ -318,7 +341,10 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
             if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
                 together.setdefault(run, []).append(joint)
+            elif run.stop - run.start >= shortest:
+                pauses.setdefault((run.start, run.stop), []).append(joint)
     for run, joints in together.items():
+        joints = sorted({*joints, *pauses.pop((run.start, run.stop), [])})
         add("frozen", tuple(names[joint] for joint in joints), run)
     for column in walking.tolist():
         steps = moved[:, column]
@@ -327,6 +353,8 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
                 [*steps[max(run.start - 1, 0) : run.start], *steps[run.stop : run.stop + 1], 0.0]
             )
             stopped_dead = beside * clip.fps > PACE and run.stop - run.start >= shortest
+            if stands[max(run.start - 1, 0) : run.stop + 1].any():
+                continue
             if stopped_dead or _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
                 add("frozen position", (names[placed(clip)[column]],), run)
     return found
@@ -346,6 +374,40 @@ def _held_place(clip: Clip, findings: list[Finding]) -> list[Finding]:
         for joint, start, stop in held_place(clip)
         if not lost[start : stop + 1, joint].any()
     ]
+
+
+def _bodies(clip: Clip, findings: list[Finding]) -> list[Finding]:
+    """Where the place of the body and the turns of its hips are held at once, one finding of both, and of
+    whatever else is held just then: trackers that lose a body hold all of it."""
+    skeleton, where = clip.skeleton, place_of(clip)
+    names = {skeleton.names[joint] for joint in (where, hips_of(skeleton))}
+    for place in [one for one in findings if one.kind == "frozen position"]:
+        same = [
+            one
+            for one in findings
+            if one.kind == "frozen" and one.joints is not None
+            if max(abs(one.start - place.start), abs(one.stop - place.stop)) <= APART
+        ]
+        turns = {name for one in same for name in one.joints or ()}
+        if place.joints != (skeleton.names[where],) or not turns & names:
+            continue
+        joints = tuple(name for name in skeleton.names if name in turns)
+        note = f"neither moves nor turns for {len(place) / clip.fps:.2f} s, while something else goes on"
+        findings = [one for one in findings if one is not place and one not in same]
+        findings.append(replace(place, kind="frozen body", joints=joints, note=note))
+    return findings
+
+
+def _but_whole(findings: list[Finding], stiff: list[Finding]) -> list[Finding]:
+    """`findings` without places that are held as all of the pose is, which is one of those `stiff`."""
+    for whole in [one for one in stiff if one.joints is None]:
+        within = range(whole.start - MANY, whole.stop + MANY + 1)
+        findings = [
+            one
+            for one in findings
+            if one.kind not in STUCK or one.start not in within or one.stop not in within
+        ]
+    return findings
 
 
 def _pace_beside(clip: Clip, start: int, stop: int) -> float:
@@ -376,8 +438,10 @@ def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
 
 
 def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
-    """Joints that are held with a tremble, led straight, or splined; not what has been found already."""
-    names, lost = clip.skeleton.names, _found(clip, findings)
+    """Joints that are held with a tremble, led straight, or splined; not what has been found already, and not
+    beside a pose that stands still: what moves little there sets off."""
+    apart = [one for one in findings if one.kind == "still" or one.kind not in NO_GAPS]
+    names, lost = clip.skeleton.names, _found(clip, apart)
     found = []
     for joints, start, stop in held(clip, lost.copy()):
         if not lost[start:stop, list(joints)].any():

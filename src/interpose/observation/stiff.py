@@ -16,7 +16,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, find_mapping
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import place_of
 
 # What is held stays within so many radians of where it is in the mean, for at least so many seconds; where
 # one joint alone is held, for longer. It usually goes further than that, by this factor, in the same time.
@@ -39,7 +39,7 @@ ALIVE = 0.5  # of what the rest of the body usually turns, at least, meanwhile: 
 # leap, or by so much (radians): what moved slowly before is real.
 NOISE, SURE = 1.3, np.radians(0.3)
 REAL = 0.2  # seconds that are real on the other side of the leap
-LONGEST = 4.0  # seconds for which what is held is followed
+AT_FIRST = 4.0  # seconds in which the end of what is held is looked for at first
 NEAR = 3  # frames by which joints of one limb may differ
 # Turns from frame to frame are even if each differs from the one before by less than this share (at 30 fps)
 # and all from their mean by less than the second: rotations that are interpolated, as such or as angles. Of
@@ -82,26 +82,40 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
             ]
             if len({one[0] for one in alike}) > 1 or stop - start >= ALONE * clip.fps:
                 groups.append((tuple(below), start, stop))
-    while groups:
-        _, start, stop = groups[0]
-        same = [one for one in groups if max(abs(one[1] - start), abs(one[2] - stop)) <= NEAR]
-        groups = [one for one in groups if one not in same]
+    ends: list[int] = []
+    for same in sorted(_at_once(groups), key=len, reverse=True):
+        _, start, stop = same[0]
         if len(same) >= MOST and _whole(turned[start:stop]):
+            ends += [start, stop]
             before = np.linalg.norm(np.diff(places[max(0, start - NEAR) : start], axis=0), axis=-1) * clip.fps
             # The tracker lost all of it, amid motion. Who stood still before did so.
             if before.size and before.mean() > PACE:
                 yield tuple(range(len(skeleton))), start, stop
             continue
         for part, start, stop in same:
+            # What leaps to a pose that is held, or from it, does not because it is held itself.
+            if any(min(abs(end - start), abs(end - stop)) <= NEAR for end in ends):
+                continue
             alive = np.delete(steps, part, axis=1).mean(axis=1)
             if np.median(alive[start:stop]) > ALIVE * np.median(alive):
                 yield part, start, stop
 
 
+def _at_once(
+    groups: list[tuple[tuple[int, ...], int, int]],
+) -> Iterator[list[tuple[tuple[int, ...], int, int]]]:
+    """Limbs that are held, in lists of those that are so at the same time."""
+    while groups:
+        _, start, stop = groups[0]
+        same = [one for one in groups if max(abs(one[1] - start), abs(one[2] - stop)) <= NEAR]
+        groups = [one for one in groups if one not in same]
+        yield same
+
+
 def held_place(clip: Clip) -> Iterator[tuple[int, int, int]]:
     """Where the place of a body is held with a tremble and then is elsewhere: the joint, and the frames start
     to stop - 1. It stops there from a pace at which nobody comes to stand at once."""
-    where, least = placed(clip)[-1], max(NEAR, round(BRIEF * clip.fps))
+    where, least = place_of(clip), max(NEAR, round(BRIEF * clip.fps))
     places = clip.translation[:, clip.translated.index(where)]
     steps = np.linalg.norm(np.diff(places, axis=0), axis=-1)
     beside = ndimage.maximum_filter(steps, footprint=[1, 1, 1, 0, 1, 1, 1], mode="nearest")
@@ -135,10 +149,10 @@ def _still(
 ) -> Iterator[tuple[int, int, int]]:
     """Frames start to stop - 1 in which a joint's rotations (F, 4), turned by `steps` (F - 1) from frame to
     frame, are held, and the step of its own beside, on the other side of which it is not lost (F,)."""
-    least, longest = max(5, round(SECONDS * fps)), round(LONGEST * fps)
+    least, longest = max(5, round(SECONDS * fps)), round(AT_FIRST * fps)
     real = max(NEAR, round(REAL * fps))
     ways = 2.0 * np.linalg.norm(turned[least:] - turned[:-least], axis=-1)
-    if not len(ways) or np.median(ways) < USUAL * HELD:
+    if not (ways > USUAL * HELD).any():
         return
     for step in np.flatnonzero(steps > LEAP).tolist():
         beside = np.append(steps[max(0, step - NEAR) : step], steps[step + 1 : step + 1 + NEAR])
@@ -150,7 +164,11 @@ def _still(
         ):
             if len(part) < least or len(other) < real or other.any():
                 continue
-            off = rotations.angle(rotations.normalize(part[:least].mean(axis=0)), part[:longest])
+            mean, sight = rotations.normalize(part[:least].mean(axis=0)), longest
+            off = rotations.angle(mean, part[:sight])
+            while sight < len(part) and (off <= HELD).all():
+                sight *= 2
+                off = rotations.angle(mean, part[:sight])
             length = int(np.argmax(off > HELD)) if (off > HELD).any() else len(off)
             if length < least:
                 continue
@@ -158,7 +176,11 @@ def _still(
             level = ndimage.median_filter(off[:length], 5, mode="nearest")
             length = max(least, int(np.flatnonzero(level <= trembles).max(initial=0)) + 1)
             # The frame before the tracker lost it, or after it was found, is one of them.
-            yield (step + 2 - length, step + 1, step) if backwards else (step + 1, step + length, step)
+            start, stop = (step + 2 - length, step + 1) if backwards else (step + 1, step + length)
+            # What it usually does is what it does apart from that.
+            apart = np.delete(ways, slice(max(0, start - least), stop))
+            if len(apart) and np.median(apart) >= USUAL * HELD:
+                yield start, stop, step
 
 
 def even(clip: Clip) -> Iterator[tuple[tuple[int, ...], int, int]]:

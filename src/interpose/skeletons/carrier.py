@@ -33,6 +33,14 @@ def placed(clip: Clip) -> list[int]:
     return sorted({*clip.skeleton.roots, hips, *clip.skeleton.ancestors(hips)} & set(clip.translated))
 
 
+def place_of(clip: Clip) -> int:
+    """The lowest of the joints `placed` that the hips hang from, or are: who is there beside them, or what,
+    says nothing of the body."""
+    hips = hips_of(clip.skeleton)
+    line = {hips, *clip.skeleton.ancestors(hips)}
+    return [joint for joint in placed(clip) if joint in line][-1]
+
+
 def carriers(clip: Clip) -> list[int]:
     """The joints that all of a motion hangs from: to move them is to move the motion.
 

@@ -18,7 +18,7 @@ from interpose.observation import Gap, Observation
 from interpose.observation.broken import broken
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import strays, stuck
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
@@ -37,9 +37,10 @@ def recover(
 
     Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose or
     jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
-    whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn. `place`
-    says that this is all that is lost: where the body is, but for the first frame of a whole clip. Feet that
-    stand tell it. Other arguments, result and errors are those of `fill`.
+    whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn, or that are
+    held in place and turn while something else goes on.
+    `place` says that this is all that is lost: where the body is, but for the first frame of a whole clip.
+    Feet that stand tell it. Other arguments, result and errors are those of `fill`.
     """
     start, stop = frames or (0, len(clip))
     if frames is not None:
@@ -62,7 +63,7 @@ def recover(
                 "Name them: --map, or load(..., roles=...).",
             )
         seen = Observation.full(clip)
-        seen.translation[start:stop, placed(clip)[-1:]] = False
+        seen.translation[start:stop, place_of(clip)] = False
         if (start, stop) == (0, len(clip)):
             # The first frame counts that belongs to the motion.
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
@@ -141,6 +142,9 @@ def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
     seen.rotation[odd], seen.translation[odd] = True, True
     for one in stuck(clip):
         held = [clip.skeleton.index(name) for name in one.joints or ()]
+        if one.kind == "frozen body":
+            seen.rotation[one.start : one.stop, held] = False
+            held = [place_of(clip)]
         # A rest pose beside the frames in which a body is stuck does not tell where it is either.
         beside = [frame for frame in odd if one.start - 1 <= frame <= one.stop]
         seen.translation[np.ix_([*range(one.start, one.stop), *beside], held)] = False
