@@ -121,7 +121,7 @@ def test_demo_of_a_rig_with_fingers(run, tmp_path):
     done = run("demo", "fingers", "--out", "here")
     assert done.code == 0
     assert "65 joints" in done.out
-    assert "filled (small)" in done.out
+    assert "filled (base)" in done.out
     assert (tmp_path / "here" / "fingers.filled.bvh").stat().st_size > 100_000
 
 

@@ -113,19 +113,23 @@ def test_what_makes_no_sense_is_refused_in_three_lines(run, takes, options, says
     assert (takes / "run.bvh").read_text() == text
 
 
-def test_what_jumped_is_put_where_the_body_was(run, takes):
-    """As `scan` advises: both halves of a clip, with open ends."""
+@pytest.mark.parametrize("at", [40, 100, 160])
+def test_what_jumped_is_put_where_the_body_was(run, takes, at):
+    """As `scan` advises, walking on and amid a turn: all comes back, in as many frames, two of them new."""
     walk = load(takes / "walk.bvh")
     away = walk.translation.copy()
-    away[100:] += [1.5, 0.0, -0.7]
+    away[at:] += [1.5, 0.0, -0.7]
     save(walk.with_motion(walk.rotation, away), takes / "jumps.bvh")
     advice = next(line for line in run("scan", "jumps.bvh").out.splitlines() if "interpose stitch" in line)
     words = [word.strip("'") for word in advice.split()[1:6]]
-    assert words == ["stitch", "jumps.bvh#:100", "jumps.bvh#100:", "--frames", "2"]
+    assert words == ["stitch", f"jumps.bvh#:{at - 1}", f"jumps.bvh#{at + 1}:", "--frames", "2"]
     assert run(*words).code == 0
     made = load(takes / "jumps.stitched.bvh")
-    assert len(made) == len(walk) + 2
-    assert np.linalg.norm(made.root[102] - walk.root[100]) < 0.1
+    assert len(made) == len(walk)
+    known = np.r_[: at - 1, at + 1 : len(walk)]
+    assert rotations.angle(made.rotation[known], walk.rotation[known]).max() < 1e-6
+    assert np.linalg.norm(made.positions() - walk.positions(), axis=-1).max() < 0.03
+    assert "jump" not in {one["kind"] for one in run("scan", "jumps.stitched.bvh", "--json").json["findings"]}
 
 
 def test_a_rest_pose_that_is_stitched_in_is_said(run, takes):

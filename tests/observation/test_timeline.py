@@ -96,6 +96,40 @@ def test_where_an_aligned_clip_lay_does_not_matter(cmu_walk, run):
     assert np.allclose(one.clip.positions(), other.clip.positions(), atol=1e-6)
 
 
+@pytest.mark.parametrize("at", [40, 90, 100, 140, 180])
+@pytest.mark.parametrize(
+    ("yaw", "shift", "off"),
+    [(0.0, (0.0, 0.0, 0.0), 0.01), (0.0, (0.3, -0.2, 0.0), 0.01), (2.0, (5.0, 0.0, 1.0), 0.02)],
+)
+def test_parts_of_a_take_go_on_where_it_did(cmu_walk, at, yaw, shift, off):
+    """Walking on and amid a turn (by 190 degrees, frames 75 to 115): what was moved comes back, and what
+    faces as it should is not turned."""
+    line = lay([cmu_walk.slice(0, at), Placement(yaw, shift).of(cmu_walk.slice(at + 2, 209))], 2)
+    assert (line.laid[1].placement.yaw == 0) == (yaw == 0)
+    apart = np.linalg.norm(line.clip.positions()[at + 2 :] - cmu_walk.positions()[at + 2 :], axis=-1)
+    assert len(line.clip) == len(cmu_walk)
+    assert apart.mean() < off
+
+
+def test_what_does_not_go_on_keeps_its_height_and_heads_on(cmu_walk, run):
+    """Another pose, another clip, or a longer gap: however they lie, strides or courses tell how to go on."""
+    lifted = Placement(0.0, (0.0, 0.2, 0.0))
+    for clip, frames in ((cmu_walk.slice(150, 209), 2), (run, 2), (cmu_walk.slice(121, 209), 21)):
+        line = lay([cmu_walk.slice(0, 100), lifted.of(clip)], frames)
+        assert line.laid[1].placement.shift[1] == 0
+        assert abs(line.laid[1].placement.yaw) > np.radians(3)
+
+
+def test_what_comes_round_keeps_its_height(jump):
+    """Who stands still in a lift: a loop's beginning is no later part of a take, though the pose goes on."""
+    lifted = jump.translation[:1] + np.linspace(0.0, 0.2, 20)[:, None, None] * [0.0, 1.0, 0.0]
+    stands = jump.with_motion(np.repeat(jump.rotation[:1], 20, axis=0), lifted)
+    line = lay([stands], 2, loop=True)
+    assert line.again is not None
+    assert line.again.placement.shift[1] == 0
+    assert lay([stands, stands], 2).laid[1].placement.shift[1] == pytest.approx(0.2, abs=0.04)
+
+
 def test_left_handed_clips_are_placed_as_in_a_mirror(cmu_walk):
     clips = cmu_walk.slice(0, 80), cmu_walk.slice(100, 200)
     one, other = lay(clips, 20), lay([reflect(clip) for clip in clips], 20)

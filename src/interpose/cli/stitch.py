@@ -70,8 +70,10 @@ def stitch(
     The first clip stays where it is, and its skeleton and frame rate are those of
     the result; what is of another rig is retargeted. Each following clip is turned
     and placed so that it goes on where the one before was heading; all of its
-    frames are kept. Heights above the floor stay as they are. Writes the clip and a
-    report beside the first file: walk.stitched.bvh and walk.stitched.json.
+    frames are kept. Heights above the floor stay as they are. Parts of one take with
+    up to .1 s between them go on as they did, also where the body's place jumps there.
+    Writes the clip and a report beside the first file: walk.stitched.bvh and
+    walk.stitched.json.
 
     Try:
       interpose stitch walk.bvh run.bvh jump.bvh --player

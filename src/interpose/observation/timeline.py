@@ -2,6 +2,7 @@
 
 What is moved is moved as a whole: turned about the vertical and shifted over the floor. Heights stay as they
 are, since the floors of takes are level as a rule, and where they are not nobody knows which one is meant.
+But where a motion goes on in the next clip, as in a take that jumps (`goes_on`), its height goes on, too.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from interpose.errors import RequestError
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP, turn, wrap
 from interpose.geometry.time import resample
+from interpose.observation.continuing import goes_on
 from interpose.observation.gait import in_step
 from interpose.observation.observation import Gap
 from interpose.observation.part import SAME
@@ -146,7 +148,9 @@ def lay(
         clips: in order.
         frames: the length of all gaps, or of each; "auto" chooses what is unhurried.
         align: turn each following clip so that it heads on where the one before it was heading, and place it
-            as far ahead as the mean of both paces leads. Without it clips stay where they lie.
+            as far ahead as the mean of both paces leads. One in which the motion of the one before goes on
+            after a moment (`goes_on`) is placed where that leads, and is not turned if it faces so already.
+            Without it clips stay where they lie.
         loop: one more gap leads back to the beginning, aligned like all others.
 
     Raises:
@@ -172,15 +176,18 @@ def lay(
     everything = joined(first, [clip for clip, _ in fitted])
     body, carried = find_humanoid(everything), carriers(everything)
     done, laid, gaps = [first], [Laid(first.name, 0, len(first))], []
-    for (clip, scale), count in zip(fitted[1:], counts):
+    for number, ((clip, scale), count) in enumerate(zip(fitted[1:], counts), start=1):
         before, start = done[-1], laid[-1].stop
         last, then, why = end(body, before, -1), end(body, clip, 0), ""
-        step = in_step(body, before, clip) if align and body.mapping.usable else None
-        if step:
-            last, then = (replace(one, velocity=way) for one, way in zip((last, then), step.velocities))
+        # Strides foretell a turn by their mean: who is amid one would be led astray, by up to 40 degrees.
+        # The beginning of a loop is no later part of a take: where it lies, and how high, tells nothing.
+        on = goes_on(before, clip, count + 1) if align and count and number < len(clips) else None
+        step = in_step(body, before, clip) if align and not on and body.mapping.usable else None
+        if told := on or step:
+            last, then = (replace(one, velocity=way) for one, way in zip((last, then), told.velocities))
         yaw = 0.0
         if align:
-            yaw = step.yaw if step else last.course - then.course
+            yaw = told.yaw if told else last.course - then.course
         if count is None and align:
             turned = Placement(yaw).of(clip, carried)
             begins = replace(then, velocity=turn(then.velocity, np.array(yaw)))
@@ -193,12 +200,13 @@ def lay(
         if step:
             yaw += step.rate * (count + 1)
         yaw = float(wrap(np.array(yaw)))
-        placed = ahead(last, then, yaw, (count + 1) / first.fps) if align else Placement()
+        rise = on.rise if on else 0.0
+        placed = ahead(last, then, yaw, (count + 1) / first.fps, rise) if align else Placement()
         held = before.slice(len(before) - 1, len(before))
         done += [held] * count + [placed.of(clip, carried)]
         gaps.append(Gap(start, start + count))
-        told = Laid(clip.name, start + count, start + count + len(clip), placed, scale, why, step is not None)
-        laid.append(told)
+        stop = start + count + len(clip)
+        laid.append(Laid(clip.name, start + count, stop, placed, scale, why, step is not None))
     again = laid.pop() if loop else None
     return Timeline(joined(first, done), gaps, laid, again)
 
@@ -354,14 +362,14 @@ def end(body: Humanoid, clip: Clip, frame: int) -> End:
     return End(places[frame], velocity, course)
 
 
-def ahead(last: End, then: End, yaw: float, seconds: float) -> Placement:
+def ahead(last: End, then: End, yaw: float, seconds: float, rise: float = 0.0) -> Placement:
     """Where a clip that begins as `then`, turned by `yaw`, goes on from `last` after some seconds.
 
-    As far as a pace leads that changes evenly from the one to the other; the height stays.
+    As far as a pace leads that changes evenly from the one to the other; the height stays, but for `rise`.
     """
     velocity = (last.velocity + turn(then.velocity, np.array(yaw))) / 2
     shift = last.place + seconds * velocity - turn(then.place, np.array(yaw))
-    return Placement(yaw, (float(shift[0]), 0.0, float(shift[2])))
+    return Placement(yaw, (float(shift[0]), rise, float(shift[2])))
 
 
 def unhurried_length(last: End, then: End, before: Clip, after: Clip) -> tuple[int, str]:
