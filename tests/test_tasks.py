@@ -129,6 +129,23 @@ def test_what_has_no_beginning_goes_on_backwards(cmu_walk):
         assert off["small"] < off["spline"]
 
 
+@pytest.mark.parametrize("method", ["auto", "small", "cmib", "cae", "spline", "kalman"])
+def test_either_sign_of_a_quaternion_is_the_same_rotation(method):
+    """In every joint and frame; also for what has never turned, which is told from what is seen of it."""
+    walk = load(resources.files("interpose") / "examples" / "walk.bvh")
+    signs = np.random.default_rng(0).choice([-1.0, 1.0], walk.rotation.shape[:2])[..., None]
+    same = walk.with_motion(walk.rotation * signs, walk.translation)
+    one, other = (tasks.fill(clip, [Gap(60, 90)], method).clip.positions() for clip in (walk, same))
+    assert np.abs(one - other).max() < 1e-9
+
+
+def test_keys_are_met_between_the_frames_of_a_network():
+    """At 120 frames a second four go by in one of its own."""
+    walk = resample(load(resources.files("interpose") / "examples" / "walk.bvh"), 120)
+    (gap,) = tasks.fill(walk, [Gap(240, 360)], "cmib").report.gaps
+    assert gap.method == "cmib"
+
+
 def test_only_and_max_gap_leave_gaps_open(cmu_walk):
     gaps = [Gap(20, 30), Gap(60, 100), Gap(120, 130)]
     done = tasks.fill(cmu_walk, gaps, "linear", max_gap=20)

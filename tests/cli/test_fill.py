@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from interpose.formats import load, save
+from interpose.methods import weights
 
 
 def frame_lines(path: Path) -> list[str]:
@@ -585,3 +587,18 @@ def test_whose_weights_they_are_is_said(run, take):
     assert "research" in report["weights"][0]["licence"]
     done = run("fill", "take.bvh", "--gap", "60:90", "--method", "small-open", "--force")
     assert "non-commercial" not in done.out
+    both = run("fill", "take.bvh", "--gap", "60:90", "--force", "--json").json
+    assert [one["name"] for one in both["weights"]] == ["base", "small"]
+    assert "weights" not in both["gaps"][0]
+
+
+def test_weights_in_a_folder_are_told_by_their_own_card(run, take):
+    """Not by that of installed ones that have their name."""
+    card = weights.find("small-open")
+    mine = take.with_name("mine")
+    mine.mkdir()
+    shutil.copy(card.onnx, mine / "small.onnx")
+    replace(card, name="small", training={"commit": "1234567"}).save(mine / "small.json")
+    done = run("fill", "take.bvh", "--gap", "60:90", "--method", "mine", "--license", "open", "--json")
+    assert done.json["weights"] == [{"name": "small", "licence": card.licence, "commit": "1234567"}]
+    assert "research" not in run("fill", "take.bvh", "--gap", "60:90", "--method", "mine", "--force").out

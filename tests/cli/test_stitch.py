@@ -41,7 +41,7 @@ def test_three_takes_on_one_timeline(run, takes):
     for gap in report["gaps"]:
         assert gap["seam_after"] <= gap["seam_limit"]
     assert "<html" in (takes / "walk.stitched.html").read_text()
-    assert "base: for research and non-commercial use" in done.out
+    assert "base and small: for research and non-commercial use" in done.out
 
 
 def test_the_report_says_where_a_clip_lies(run, takes):

@@ -164,6 +164,18 @@ def test_the_protocol_of_cmib(published):
     assert result.rows["linear"][30].l2p > 0
 
 
+def test_keys_are_averaged_in_as_they_are(published, monkeypatch):
+    """Also where a completion has come round to the other sign of the last one's quaternions."""
+    held, rules = lafan1.load(published, "validation"), PROTOCOLS["cmib"]
+    windows = cut(held.sequences, rules.window(30), 40, held.bones)
+    rows = []
+    for sign in (1.0, -1.0):
+        signs = np.append(np.ones(29), sign)[:, None, None]
+        monkeypatch.setattr(lafan1, "resign", lambda rotation, before, signs=signs: rotation * signs)
+        rows.append(lafan1.measure(held, rules, windows, 30, registry.get("zero-velocity"), False))
+    assert rows[0].l2q == rows[1].l2q > 0
+
+
 def test_extended_gaps_have_windows_of_their_own():
     rules = PROTOCOLS["official"]
     assert [rules.window(gap) for gap in (5, 45, 60, 120)] == [65, 65, 140, 140]

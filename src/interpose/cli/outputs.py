@@ -18,7 +18,6 @@ from interpose.errors import FileError, RequestError
 if TYPE_CHECKING:
     from interpose.clip import Clip
     from interpose.finish import Completion, GapReport
-    from interpose.methods.weights import Card
     from interpose.observation import Gap
 
 # Units of the measures in a report, for whoever reads the JSON.
@@ -168,7 +167,9 @@ def to_json(
     def entry(number: int, gap: dict[str, Any]) -> dict[str, Any]:
         joints = gap["joints"]
         rest = {
-            name: value for name, value in gap.items() if name not in ("number", "start", "stop", "joints")
+            name: value
+            for name, value in gap.items()
+            if name not in ("number", "start", "stop", "joints", "weights")
         }
         return {"number": number, "frames": f"{gap['start']}:{gap['stop']}", "joints": joints, **rest}
 
@@ -193,20 +194,17 @@ def to_json(
             for number, gap in numbered(completion)
         ],
         **{name: report[name] for name in ("moments", "exchanged") if name in report},
-        "weights": [
-            {"name": card.name, "licence": card.licence, "commit": card.training.get("commit")}
-            for card in used(completion)
-        ],
+        "weights": used(completion),
         "units": UNITS,
     }
 
 
-def used(completion: Completion) -> list[Card]:
-    """The cards of the trained weights that had a part in a completion."""
-    from interpose.methods import weights
-
-    models = {gap.model for gap in completion.report.gaps}
-    return [card for card in weights.cards() if card.name in models]
+def used(completion: Completion) -> list[dict[str, Any]]:
+    """The trained weights that had a part in a completion, each once: name, licence and commit."""
+    found: list[dict[str, Any]] = []
+    for gap in completion.report.gaps:
+        found += [one for one in gap.weights if one not in found]
+    return found
 
 
 def finish(
@@ -239,7 +237,9 @@ def finish(
 
 def licence(completion: Completion) -> list[str]:
     """A note where weights had a part in it that are not for any use."""
-    closed = [card.name for card in used(completion) if not card.open]
+    from interpose.methods.weights import for_any_use
+
+    closed = [one["name"] for one in used(completion) if not for_any_use(one["licence"])]
     named = " and ".join(closed)
     return [f"{named}: for research and non-commercial use; --license open takes others"] if closed else []
 

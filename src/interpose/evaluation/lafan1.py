@@ -462,6 +462,9 @@ def measure(
         before = windows.rotation[:, part.start - 1] if first == 0 else rotation[:, 0]
         turned, placed = forward(resign(rotation, before), root, windows.bones)
     spent = 1000 * (time.perf_counter() - start) / len(windows)
+    if rules.keys_count:
+        # They are known, also where quaternions have come round to the other sign on the way.
+        turned[:, [0, -1]], placed[:, [0, -1]] = truth_turned[:, [0, -1]], truth[:, [0, -1]]
     if not rules.leaves:
         above = [PARENTS[joint] for joint in LEAVES]
         for q in (turned, truth_turned):

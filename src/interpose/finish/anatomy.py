@@ -130,7 +130,7 @@ def locked(clip: Clip, known: Observation) -> Observation:
     still = np.zeros(len(clip.skeleton), bool)
     for joint in np.flatnonzero(known.rotation.sum(axis=0) >= clip.fps):
         seen = clip.rotation[known.rotation[:, joint], joint]
-        still[joint] = (np.abs(seen - seen[0]) < LOCKED).all()
+        still[joint] = (np.abs(rotations.alike(seen, seen[:1]) - seen[0]) < LOCKED).all()
     return replace(known, rotation=known.rotation | still) if still.mean() <= MOVING else known
 
 

@@ -51,6 +51,7 @@ def gap_report(
         gap.joints,
         span.method,
         model=raw.notes.get("model") if own else None,
+        weights=raw.notes.get("weights", ()) if own else (),
         solve_error=_centi(solved),
         seam_before=_centi(before),
         seam_after=_centi(after),

@@ -37,6 +37,7 @@ class GapReport:
         joints: the joints whose values are missing; None when it is the whole pose.
         method: the method that filled it, by name: the fallback's when it fell back.
         model: the trained model, if the method has one.
+        weights: of all trained models that were asked, with name, licence and commit.
         solve_error: cm, mean distance of the solved pose from the positions that the method gave.
         seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of
             what the method said and of what is returned.
@@ -65,6 +66,7 @@ class GapReport:
     joints: tuple[str, ...] | None
     method: str
     model: str | None = None
+    weights: tuple[dict[str, Any], ...] = ()
     solve_error: float | None = None
     seam_before: float | None = None
     seam_after: float | None = None

@@ -96,7 +96,8 @@ class Base:
     @on_the_floor
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """Rotations of the mapped joints and the way of the hips; a spline for all else."""
-        card, body = self.card, observed_body(clip, observation)
+        cards, body = self.asked, observed_body(clip, observation)
+        card = cards[0]
         base = Spline().complete(clip, observation).clip
         turned, root, bones = body.rotations(base), body.root(base) * body.scale, body.bones * body.scale
         known = knowledge(observation, body.mapping)
@@ -113,7 +114,7 @@ class Base:
             bones,
             *pinned(observation, body.mapping, times, body.scale * body.hand),
         )
-        answer = run_long(self.asked, seen)
+        answer = run_long(cards, seen)
         said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
         back = np.interp(np.arange(len(clip))[missing], times, np.arange(len(times)))
@@ -126,7 +127,7 @@ class Base:
         stands, expected = np.full((len(clip), len(FEET)), np.nan), np.full(len(clip), np.nan)
         stands[missing] = sample(answer.stands, back)
         expected[missing] = sample(answer.expected[:, None], back)[:, 0] / body.scale
-        return Raw(done, notes={"model": card.name}, stands=stands, expected=expected)
+        return Raw(done, notes=weights.told(*cards), stands=stands, expected=expected)
 
 
 @dataclass

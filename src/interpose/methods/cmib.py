@@ -142,13 +142,16 @@ class Cmib:
                 if remark := self._odd(root[a], root[b], (b - a) / clip.fps):
                     remarks[f"{a + 1}:{b}"] = [remark]
             said = rotations.continuous(said)
-            hips, said = (ndimage.gaussian_filter1d(v, SMOOTH, axis=0, mode="nearest") for v in (hips, said))
+            for values in (hips, said):
+                calm = ndimage.gaussian_filter1d(values, SMOOTH, axis=0, mode="nearest")
+                # Keys are not noisy: above 30 fps frames lie between them and the frame beside.
+                values[~known] = calm[~known]
             inside = np.setdiff1d(np.arange(first, last), keys)
             back = (inside - first) * scale
             root[inside] = sample_smooth(hips, back)
             turned[inside] = sample_rotations_smooth(rotations.normalize(said), back)
         done = body.to_clip(turned, root / body.scale, base)
-        return Raw(done, notes={"model": card.name, "remarks": remarks, "missed": missed})
+        return Raw(done, notes={**weights.told(card), "remarks": remarks, "missed": missed})
 
     def _odd(self, here: np.ndarray, there: np.ndarray, seconds: float) -> str | None:
         """How two keys contradict the action, if they do: by the pace that they ask for (figure 9).

@@ -110,7 +110,7 @@ def speak(clip: Clip, observation: Observation, card: weights.Card, network: Net
     spoken = share * spoken + (1 - share) * body.positions(base) * body.hand
     own = body.from_canonical(sample_smooth(poses, back), rotations.multiply(ahead, like))
     rows, joints = body.mapping.mapped
-    notes = {"model": card.name, "drift": drift}
+    notes = {**weights.told(card), "drift": drift}
     return Raw(base, spoken[:, rows], joints, notes, own[:, rows])
 
 

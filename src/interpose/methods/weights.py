@@ -65,11 +65,15 @@ class Card:
     @property
     def open(self) -> bool:
         """Whether the weights may be used for anything."""
-        return self.licence.startswith(OPEN)
+        return for_any_use(self.licence)
 
     @property
     def onnx(self) -> Path:
         return self.path.with_suffix(".onnx")
+
+    def brief(self) -> dict[str, Any]:
+        """What reports say of the weights that had a part in them."""
+        return {"name": self.name, "licence": self.licence, "commit": self.training.get("commit")}
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types, as in the file."""
@@ -92,6 +96,11 @@ class Card:
                 str(reason),
                 "Export the weights again; of interpose's own: install it again.",
             ) from None
+
+
+def for_any_use(licence: str) -> bool:
+    """Whether a licence is for any use."""
+    return licence.startswith(OPEN)
 
 
 def session(path: Path) -> Any:
@@ -207,6 +216,11 @@ def find(method: str) -> Card:
 def of(method: str, trained: Card | None) -> Card:
     """The weights that somebody trained for a method, or else the installed ones; raises as `find` does."""
     return allowed(trained) if trained else find(method)
+
+
+def told(*cards: Card) -> dict[str, Any]:
+    """Notes of a method that has asked weights, its own first."""
+    return {"model": cards[0].name, "weights": tuple(card.brief() for card in cards)}
 
 
 def load(folder: Path, method: str) -> Card:

@@ -449,7 +449,7 @@ def _stiff(clip: Clip, findings: list[Finding]) -> list[Finding]:
             note = f"hardly moves for {(stop - start) / clip.fps:.2f} s, beside a jump"
             some = None if len(joints) == len(names) else tuple(names[joint] for joint in joints)
             found.append(Finding("frozen", some, start, stop, note))
-    moving = (np.ptp(clip.rotation, axis=0).max(axis=1) > LIFELESS).sum()
+    moving = (np.ptp(rotations.continuous(clip.rotation), axis=0).max(axis=1) > LIFELESS).sum()
     for kind, turns, led in (("straight", "evenly", even), ("splined", "along a smooth curve", splined)):
         for joints, start, stop in led(clip):
             if not lost[start:stop, list(joints)].any():
