@@ -192,7 +192,7 @@ def to_json(
             }
             for number, gap in numbered(completion)
         ],
-        **{name: report[name] for name in ("moments", "exchanged") if name in report},
+        **{name: report[name] for name in ("moments", "exchanged", "unpaired") if name in report},
         "weights": [
             {"name": card.name, "licence": card.licence, "commit": card.training.get("commit")}
             for card in used(completion)
