@@ -17,9 +17,11 @@ from interpose.skeletons.mirror import counterparts
 
 # Seconds that it lasts at most: of longer ones nobody knows which part is the wrong one.
 LONGEST = 3.0
-# The joints concerned turn by more than this from one frame to the next (radians, all together), and by less
-# than this share of it if it is undone: in 215 clips of all data sets two knees do, which are flipped.
-TURN, SHARE = 0.6, 0.35
+# The joints concerned turn by more than this from one frame to the next (radians, all together) where it
+# surely begins or ends, and by less than the share `sure` of it if it is undone.
+TURN = 0.6
+# The other end only spares something: they turn by more than this, and by less than the share `likely`.
+LEAST = 0.1
 # A joint that turns less than this in the whole clip (radians) has no data, and none on the wrong side.
 LIFELESS = 1e-3
 
@@ -37,6 +39,10 @@ class Exchange:
     right: tuple[int, ...]
     alone: tuple[int, ...] = ()
 
+    # In 235 clips of all data sets, 366,000 frames, no share is below .83, of arms or legs. Where legs pass
+    # each other at a radian a frame, exchanges end with shares of up to .8: .35 at both ends finds 35 of 48
+    # exchanges of legs in a run and a dance, these find all 48.
+    sure, likely = 0.5, 0.8
     kind = "exchanged"
     note = "left and right are taken for each other"
 
@@ -62,6 +68,8 @@ class Flip:
     limb: tuple[int, int, int]  # thigh, shin and foot, or their like
     alone = ()
 
+    # In 215 clips of all data sets two knees have two ends below this, which are flipped.
+    sure = likely = 0.35
     kind = "flipped"
     note = "half a turn about itself"
 
@@ -151,14 +159,32 @@ def _spells(clip: Clip, kind: Kind) -> list[Kind]:
     def turn(before: np.ndarray, after: np.ndarray) -> np.ndarray:
         return np.asarray(rotations.angle(before[:-1, joints], after[1:, joints]).sum(axis=1))
 
-    stay = turn(own, own)
-    cuts = (np.flatnonzero((stay > TURN) & (turn(own, other) < SHARE * stay)) + 1).tolist()
-    found, at = list[Kind](), 0
-    while at + 1 < len(cuts):
-        start, stop = cuts[at : at + 2]
-        if stop - start > LONGEST * clip.fps:
-            at += 1
-            continue
-        found.append(replace(kind, start=start, stop=stop))
-        at += 2
-    return found
+    stay, change = turn(own, own), turn(own, other)
+    sure = (stay > TURN) & (change < kind.sure * stay)
+    if not sure.any():
+        return []
+    cuts = np.flatnonzero(sure | ((stay > LEAST) & (change < kind.likely * stay)))
+    ends = _pairs(cuts, (stay - change)[cuts], sure[cuts], round(LONGEST * clip.fps))
+    return [replace(kind, start=start + 1, stop=stop + 1) for start, stop in ends]
+
+
+def _pairs(cuts: np.ndarray, spared: np.ndarray, sure: np.ndarray, longest: int) -> list[tuple[int, int]]:
+    """Of cuts (n,), in order, those between which undoing spares most in all: pairs that do not overlap.
+
+    The two of a pair are at most `longest` apart, and one of them is `sure`.
+    """
+    most, pair = np.zeros(len(cuts) + 1), np.full(len(cuts) + 1, -1)
+    for stop in range(len(cuts)):
+        # What the first `stop + 1` cuts spare at most, and the cut that is paired with the last of them.
+        most[stop + 1] = most[stop]
+        for start in range(int(np.searchsorted(cuts, cuts[stop] - longest)), stop):
+            gain = most[start] + spared[start] + spared[stop]
+            if (sure[start] or sure[stop]) and gain > most[stop + 1]:
+                most[stop + 1], pair[stop + 1] = gain, start
+    found, count = list[tuple[int, int]](), len(cuts)
+    while count:
+        start = int(pair[count])
+        if start >= 0:
+            found.append((int(cuts[start]), int(cuts[count - 1])))
+        count = start if start >= 0 else count - 1
+    return found[::-1]
