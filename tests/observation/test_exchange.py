@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+import interpose
 from interpose import formats, tasks
+from interpose.geometry import rotations
 from interpose.observation.exchange import Flip, exchanges, put_back
 from interpose.observation.scan import scan, to_gaps
 
@@ -31,6 +36,76 @@ def test_limbs_are_found_and_put_back_exactly(cmu_walk, parts, ranges):
     said = [one for one in scan(odd) if one.kind == "exchanged"]
     assert [(one.start, one.stop) for one in said] == ranges
     assert to_gaps(said) == []
+
+
+@pytest.mark.parametrize("ranges", [[(19, 25)], [(44, 50)], [(19, 25), (44, 50)], [(5, 19), (26, 40)]])
+def test_an_exchange_may_end_where_legs_pass_each_other(data, ranges):
+    """There it turns them little; the other end is sure. What lies between two of them stays."""
+    clip = formats.load(data / "cmu_jump.bvh")
+    clip = clip.slice(1, len(clip))
+    odd = swapped(clip, LEG, *ranges)
+    found = exchanges(odd)
+    assert [(one.start, one.stop) for one in found] == ranges
+    assert put_back(odd, found).rotation.tobytes() == clip.rotation.tobytes()
+
+
+def whole_arms(clip, names, start, stop):
+    """The clip with both arms, and all that hangs from them, on the other side in some frames; `names` are
+    pairs of what is called left and right."""
+    left, right = ([clip.skeleton.index(pair[side]) for pair in names] for side in (0, 1))
+    rotation = clip.rotation.copy()
+    rotation[start:stop, left + right] = clip.rotation[start:stop, right + left]
+    return clip.with_motion(rotation, clip.translation)
+
+
+CMU_ARM = [(f"Left{part}", f"Right{part}") for part in (*ARM, "FingerBase", "HandIndex1")] + [
+    ("LThumb", "RThumb")
+]
+
+
+@pytest.mark.parametrize("part", [(60, 66), (60, 100), (40, 120)])
+def test_hands_and_fingers_change_sides_with_their_arms(cmu_walk, part):
+    """Wherever they go, none is left on the other side, and none is interpolated."""
+    clip = cmu_walk.slice(1, 209)
+    odd = whole_arms(clip, CMU_ARM, *part)
+    thumb = clip.skeleton.index("LThumb")
+    away = rotations.angle(odd.rotation[slice(*part), thumb], clip.rotation[slice(*part), thumb])
+    assert away.max() > 0.5
+    done = tasks.recover(odd)
+    assert done.clip.rotation.tobytes() == clip.rotation.tobytes()
+    assert {one.joint for one in done.report.exchanged} == {name for pair in CMU_ARM for name in pair}
+    assert [done.report.gaps, done.report.moments, done.report.unpaired] == [[], (), ()]
+
+
+def test_all_fingers_of_a_game_rig_change_sides():
+    clip = formats.load(Path(interpose.__file__).parent / "examples" / "fingers.bvh")
+    hand = [name for name in clip.skeleton.names if "LeftHand" in name]
+    arm = ["mixamorig:Left" + part for part in ARM[:-1]]
+    pairs = [(name, name.replace("Left", "Right")) for name in arm + hand]
+    assert len(pairs) == 24
+    found = exchanges(odd := whole_arms(clip, pairs, 70, 100))
+    assert [(one.start, one.stop, len(one.joints)) for one in found] == [(70, 100, 48)]
+    assert put_back(odd, found).rotation.tobytes() == clip.rotation.tobytes()
+
+
+def test_fingers_that_stayed_on_their_side_stay(cmu_walk):
+    """As where only the 22 joints that networks know changed sides."""
+    clip = cmu_walk.slice(1, 209)
+    (found,) = exchanges(swapped(clip, ARM, (60, 100)))
+    assert {clip.skeleton.names[joint] for joint in found.joints} == {
+        side + part for side in ("Left", "Right") for part in ARM
+    }
+
+
+def test_what_has_no_like_on_the_other_side_is_left_and_told(cmu_walk):
+    clip = cmu_walk.slice(1, 209)
+    names = tuple("Racket" if name == "LThumb" else name for name in clip.skeleton.names)
+    clip = replace(clip, skeleton=replace(clip.skeleton, names=names), source=None)
+    done = tasks.recover(whole_arms(clip, CMU_ARM[:-1], 60, 100))
+    assert done.clip.rotation.tobytes() == clip.rotation.tobytes()
+    assert done.report.unpaired == ("Racket", "RThumb")
+    assert "left, without a like on the other side: Racket, RThumb" in str(done.report)
+    assert done.report.to_dict()["unpaired"] == ["Racket", "RThumb"]
 
 
 def test_recover_puts_them_back_and_says_so(cmu_walk):
@@ -66,7 +141,8 @@ def test_nothing_is_exchanged_in_real_clips(data, name):
 def test_what_changes_sides_for_good_is_left(cmu_walk):
     """Of one change alone nobody knows which side of it is the wrong one."""
     clip = cmu_walk.slice(1, 209)
-    assert exchanges(swapped(clip, LEG, (100, len(clip)))) == []
+    for start in range(10, 200, 10):
+        assert exchanges(swapped(clip, LEG, (start, len(clip)))) == []
 
 
 @pytest.mark.parametrize(

@@ -193,7 +193,7 @@ def to_json(
             }
             for number, gap in numbered(completion)
         ],
-        **{name: report[name] for name in ("moments", "exchanged") if name in report},
+        **{name: report[name] for name in ("moments", "exchanged", "unpaired") if name in report},
         "weights": used(completion),
         "units": UNITS,
     }

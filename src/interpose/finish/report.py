@@ -186,7 +186,10 @@ class JointMoments:
 @dataclass(frozen=True)
 class Report:
     """The filled gaps of a clip in order of time, those left open, the action that was asked for, what was
-    lost for moments only, what was on the wrong side and is put back, and what denoising has to say."""
+    lost for moments only, what was on the wrong side and is put back, and what denoising has to say.
+
+    `unpaired` are joints that hang from those that changed sides and have no like there: they stay.
+    """
 
     method: str
     gaps: list[GapReport] = field(default_factory=list)
@@ -195,6 +198,7 @@ class Report:
     noise: NoiseReport | None = None
     moments: tuple[JointMoments, ...] = ()
     exchanged: tuple[JointMoments, ...] = ()
+    unpaired: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types only, ready for JSON."""
@@ -202,6 +206,7 @@ class Report:
         more = {} if self.noise is None else {"denoised": _plain(asdict(self.noise))}
         more |= {"moments": [_plain(asdict(one)) for one in self.moments]} if self.moments else {}
         more |= {"exchanged": [_plain(asdict(one)) for one in self.exchanged]} if self.exchanged else {}
+        more |= {"unpaired": list(self.unpaired)} if self.unpaired else {}
         return {"method": self.method, "action": self.action, "gaps": gaps, "open": left, **more}
 
     @property
@@ -222,7 +227,8 @@ class Report:
             {at for one in self.exchanged for at in one.frames}, key=lambda at: int(at.split(":")[0])
         )
         what = f"{few(joints)}, in {', '.join(frames)}"
-        return f"taken for the other side, or for half a turn, and put back: {what}"
+        rest = f"; left, without a like on the other side: {few(self.unpaired)}" * bool(self.unpaired)
+        return f"taken for the other side, or for half a turn, and put back: {what}{rest}"
 
     def __str__(self) -> str:
         if self.noise is not None:

@@ -116,7 +116,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       something else goes on: fingers, a prop, somebody else. `recover` restores both at once.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
       to three frames: what `recover` restores.
-    - "exchanged": arms, or legs, that have each other's turns for a while: `recover` puts them back.
+    - "exchanged": arms, or legs, that have each other's turns for a while, hands and fingers with them where
+      they do: `recover` puts them back.
     - "flipped": a thigh and its shin, or an arm, that are turned by half a turn about the line between their
       ends for a while, so that the knee bends backwards: `recover` turns them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay

@@ -41,11 +41,11 @@ def mirrored(labels: Sequence[str]) -> list[int]:
     return [labels.index(swap(label)) if swap(label) in labels else 0 for label in labels]
 
 
-def sides(skeleton: Skeleton) -> tuple[int, ...]:
-    """For each joint the index of its mirror image, itself for those in the middle.
+def counterparts(skeleton: Skeleton) -> tuple[int, ...]:
+    """For each joint the index of what seems its mirror image, itself where there is none, as in the middle.
 
-    By the canonical joints, and for all others by left and right in their names. Raises RequestError when
-    the two sides do not have the same joints.
+    By the canonical joints, and for all others by left and right in their names. Nothing is checked: of two
+    joints one may be the other's, and not the other way round.
     """
     place = {name: joint for joint, name in enumerate(skeleton.names)}
     swapped = list(range(len(skeleton)))
@@ -56,6 +56,15 @@ def sides(skeleton: Skeleton) -> tuple[int, ...]:
         left, right = found[one], found[other]
         if left is not None and right is not None:
             swapped[left] = right
+    return tuple(swapped)
+
+
+def sides(skeleton: Skeleton) -> tuple[int, ...]:
+    """For each joint the index of its mirror image, itself for those in the middle.
+
+    They are the `counterparts`. Raises RequestError when the two sides do not have the same joints.
+    """
+    swapped = counterparts(skeleton)
     for joint, other in enumerate(swapped):
         parent = skeleton.parents[joint]
         expected = swapped[parent] if parent >= 0 else -1
@@ -65,7 +74,7 @@ def sides(skeleton: Skeleton) -> tuple[int, ...]:
                 f"{skeleton.names[joint]} and {skeleton.names[other]} do not hang from the same place",
                 "Mirroring needs the same joints on the left and on the right.",
             )
-    return tuple(swapped)
+    return swapped
 
 
 @lru_cache(maxsize=64)

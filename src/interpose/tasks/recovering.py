@@ -132,8 +132,11 @@ def _with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Complet
         provenance[one.start : one.stop, one.joints] = Provenance.CORRECTED
         for joint in one.joints:
             frames.setdefault(joint, []).append(f"{one.start}:{one.stop}")
-    told = tuple(JointMoments(done.clip.skeleton.names[j], tuple(at)) for j, at in sorted(frames.items()))
-    return replace(done, provenance=provenance, report=replace(done.report, exchanged=told))
+    names = done.clip.skeleton.names
+    told = tuple(JointMoments(names[joint], tuple(at)) for joint, at in sorted(frames.items()))
+    alone = tuple(names[joint] for joint in sorted({joint for one in swapped for joint in one.alone}))
+    report = replace(done.report, exchanged=told, unpaired=alone)
+    return replace(done, provenance=provenance, report=report)
 
 
 def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
