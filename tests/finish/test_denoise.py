@@ -47,6 +47,17 @@ def test_noise_on_rotations_falls(cmu_walk):
     assert _apart(done.clip, cmu_walk).mean() < 0.5 * _apart(noisy, cmu_walk).mean()
 
 
+@pytest.mark.parametrize("name", ["cmu_walk", "cmu_run", "cmu_jump"])
+def test_light_noise_falls_and_quick_motion_stays(data, name):
+    """Of half a centimetre: neither a quick limb nor a foot may be much worse than it came."""
+    clip = interpose.load(data / f"{name}.bvh")
+    noisy = tremble(clip, 0.3, np.random.default_rng(0))
+    before, after = _apart(noisy, clip), _apart(interpose.denoise(noisy).clip, clip)
+    assert after.mean() < 0.85 * before.mean()
+    assert after.max() <= before.max()
+    assert (after - before).max() < 1.6
+
+
 @pytest.mark.parametrize("name", ["cmu_walk", "cmu_run", "cmu_jump", "cmu_02_03"])
 def test_a_clean_clip_hardly_changes(data, name):
     clip = interpose.load(data / f"{name}.bvh")

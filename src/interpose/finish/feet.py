@@ -245,6 +245,7 @@ def plant(
     blend: float = BLENDS[0],
     stands: np.ndarray | None = None,
     step: float = STEP,
+    lift: bool = True,
 ) -> Clip:
     """Hold the feet during contacts in the span, and keep them above the floor.
 
@@ -259,6 +260,8 @@ def plant(
             made the motion: a foot is held where it is slow and low, unless this says that it does not stand.
             NaN, and None, where it says nothing.
         step: metres; what moves further while it is slow and low is a step, and no stance.
+        lift: whether feet are kept above the floor, and clear of it while they are quick; else they are held
+            along it alone, and stay as high as they are.
     """
     skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
@@ -286,10 +289,11 @@ def plant(
             planted &= ~(said < LIKELY)
         shift = _hold(feet, planted, movable, clip.fps, over)
         shift *= _let_go(leg, placed / grown, shift, over)[:, None, None]
-        speeds = measures.speed(feet + shift, clip.fps)
-        lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
-        lift = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
-        shift[..., 1] += (lift * np.prod(envelope(movable, over), axis=0))[:, None]
+        if lift:
+            speeds = measures.speed(feet + shift, clip.fps)
+            lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
+            raised = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
+            shift[..., 1] += (raised * np.prod(envelope(movable, over), axis=0))[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = reach(
