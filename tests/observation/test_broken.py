@@ -7,8 +7,10 @@ import pytest
 from tests.skeletons.rigs import under_root
 
 from interpose import formats
+from interpose.evaluation.denoising import drop
 from interpose.geometry import rotations
 from interpose.observation import Observation
+from interpose.observation import broken as module
 from interpose.observation.broken import _smoother, broken
 from interpose.skeletons.carrier import hips_of
 
@@ -165,4 +167,18 @@ def test_what_would_throw_a_foot_about_is_not_lost(cmu_walk):
     for clip, real in ((spun, False), (cmu_walk.with_motion(spiked, cmu_walk.translation), True)):
         alone = Observation.full(clip)
         alone.rotation[60, ankle] = False
-        assert _smoother(clip, alone).rotation[60, ankle] != real
+        nothing_sure = np.zeros(clip.rotation.shape[:2], bool)
+        assert _smoother(clip, alone, nothing_sure).rotation[60, ankle] != real
+
+
+def test_what_snaps_again_and_again_is_lost_whatever_would_be_rougher(cmu_walk, monkeypatch):
+    """With half of all joints at rest in every frame there is always one that goes more smoothly as it is."""
+    walk = cmu_walk.slice(1, len(cmu_walk))
+    dropped = drop(walk, 0.5, np.random.default_rng(0))
+    found = broken(dropped)
+    monkeypatch.setattr(module, "ROUGHER", 0.0)
+    monkeypatch.setattr(module, "ROUGH", 0.0)
+    alone = broken(dropped)
+    assert not found.rotation[:, walk.skeleton.index("LeftForeArm")].all()
+    lost = ~found.rotation & (np.abs((dropped.rotation * walk.skeleton.rest_rotation).sum(-1)) > 1 - 1e-12)
+    assert (~alone.rotation & lost).sum() > 0.99 * lost.sum() > 1000

@@ -66,13 +66,15 @@ def broken(clip: Clip) -> Observation:
     seen.rotation[lost | (spikes & _real(clip, lost, spikes, usual))] = False
     places = clip.translation[:, [clip.translated.index(joint) for joint in placing]]
     homes = [skeleton.rest_translation[placing], np.zeros((len(placing), 3))]
-    snaps, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps)
-    seen.translation[:, placing] = ~(snaps | away | spikes)
-    return _smoother(clip, seen)
+    gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps)
+    seen.translation[:, placing] = ~(gone | away | spikes)
+    again = (np.diff(snaps, axis=0, prepend=False) & snaps).sum(axis=0) >= MANY
+    return _smoother(clip, seen, snaps & again)
 
 
-def _smoother(clip: Clip, seen: Observation) -> Observation:
-    """The observation, to which is known what would be rougher if it were interpolated.
+def _smoother(clip: Clip, seen: Observation, sure: np.ndarray) -> Observation:
+    """The observation, to which is known what would be rougher if it were interpolated; but not what is
+    surely lost (F, J): where many joints snap again and again something is lost in every frame.
 
     Joints that turn at a hundred degrees a frame while all that hangs below them goes on smoothly, as those
     of some solvers do whose knee is straight, are no spikes: without one of them a leg is thrown about.
@@ -96,7 +98,8 @@ def _smoother(clip: Clip, seen: Observation) -> Observation:
     kept = replace(seen, rotation=seen.rotation.copy(), translation=seen.translation.copy())
     for start, stop, (before, after) in roughness(lost, clip, cured):
         if (after > ROUGHER * before + ROUGH / clip.fps**2).any():
-            kept.rotation[start:stop] = kept.translation[start:stop] = True
+            kept.rotation[start:stop] = ~sure[start:stop]
+            kept.translation[start:stop] = True
     return kept
 
 
