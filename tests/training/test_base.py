@@ -340,7 +340,7 @@ def of(path):  # type: ignore[no-untyped-def]
     return replace(card, path=path.with_suffix(".json"))
 
 
-def test_weights_that_are_asked_beside_others_count_as_much(model, given, tmp_path):
+def test_weights_that_are_asked_beside_others_count_to_their_share(model, given, tmp_path):
     """And an action that they do not know is none to them; what is known stays exactly."""
     cards = []
     for seed in (1, 2):
@@ -356,11 +356,15 @@ def test_weights_that_are_asked_beside_others_count_as_much(model, given, tmp_pa
     both, first = method.ask([one, two], seen, hole), method.ask([one], seen, hole)
     second = method.ask([two], replace(seen, actions=("", "")), hole)
     assert np.abs(first.root - second.root).max() > 1e-3
-    assert np.allclose(both.root, (first.root + second.root) / 2)
-    assert np.allclose(both.expected, (first.expected + second.expected) / 2)
+    share = method.BESIDE
+    assert np.allclose(both.root, (1 - share) * first.root + share * second.root)
+    assert np.allclose(both.expected, (1 - share) * first.expected + share * second.expected)
     apart = rotations.angle(first.local, second.local)
-    assert np.allclose(rotations.angle(both.local, first.local), apart / 2, atol=1e-6)
-    assert np.allclose(rotations.angle(both.local, second.local), apart / 2, atol=1e-6)
+    # A mean of quaternions is none of angles, but by little.
+    assert np.allclose(rotations.angle(both.local, first.local), share * apart, atol=0.02 * apart.max())
+    assert np.allclose(
+        rotations.angle(both.local, second.local), (1 - share) * apart, atol=0.02 * apart.max()
+    )
 
 
 def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_path):

@@ -135,7 +135,7 @@ def threshold(
 @bench.command
 def reliability(
     *,
-    method: str = "small",
+    method: str = "base",
     most: Most = 40,
     plot: Path | None = None,
     asked: Tabled = Tabled(),
