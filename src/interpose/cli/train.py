@@ -158,7 +158,7 @@ def own(
         )
     if any(out.glob("*.onnx")):
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
-    asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
+    asked = Budget.parse(budget)
     # Gently: what it knows of all motion is to stay.
     gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0)
     settings = change(gentle, set)
@@ -178,7 +178,7 @@ def own(
     run.mkdir(parents=True, exist_ok=True)
     (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
-    export_base(run, [pack], out, ["train"], allowed, before=begin)
+    export_base(run, [pack], out, ["train"])
     before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))
     say()
     rows = [

@@ -292,10 +292,11 @@ def relief(begun: Tensor, placed: Tensor, known: Tensor) -> Tensor:
     return (off * missing).sum() / missing.sum().clamp(min=1) / TYPICAL + 1e-2
 
 
-def title(config: str, datasets: str) -> str:
+def title(config: str, datasets: str, free: bool = False) -> str:
     """What weights are called: the configuration, and what they were trained on, if not on all; "open" if on
-    what may be used for anything."""
-    return "-".join([config, *({"cmu": "open"}.get(name, name) for name in datasets.split(",") if name)])
+    CMU and they are free for any use."""
+    names = [name for name in datasets.split(",") if name]
+    return "-".join([config, *(["open"] if free and names == ["cmu"] else names)])
 
 
 def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:

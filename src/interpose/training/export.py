@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +45,7 @@ LICENCES = {
     OWN: "your own",
 }
 RESEARCH = "research and non-commercial use: the training data is licensed so"
+FREE = f"{OPEN}: trained on CMU data alone"
 # What the recipe of the autoencoder trains, for the card; the others are there to be compared with.
 DESCRIPTIONS = {
     "cae": "Convolutional autoencoder for infilling (Kaufmann et al. 2020)",
@@ -65,6 +66,8 @@ class _Run:
         auto: what `auto` goes by. It stays as measured on the weights that the run started from: a run that
             goes on may train on the performers that it was measured with. Of a first run it is not measured
             yet, so that all gaps are the spline's until `interpose bench threshold --save`.
+        licence: what the weights that it started from may be used for; "" of a first run.
+        data: what these had learned from.
     """
 
     folder: Path
@@ -72,6 +75,8 @@ class _Run:
     log: list[dict[str, Any]]
     earlier: list[dict[str, Any]]
     auto: dict[str, Any]
+    licence: str = ""
+    data: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod
     def of(cls, folder: Path) -> _Run:
@@ -90,7 +95,13 @@ class _Run:
             for entry in lines("log.jsonl")
         ]
         kept = json.loads((folder / "earlier.json").read_text())
-        return cls(folder, settings, before + after, kept["training"], kept["auto"])
+        # Older runs did not keep the licence. Their history tells all data sets that were ever asked for: if
+        # that is CMU each time, as `small-open` was trained, nothing else can be in it.
+        alone = all(one.get("datasets") == "cmu" for one in kept["training"])
+        licence = kept.get("licence") or (FREE if alone else RESEARCH)
+        return cls(
+            folder, settings, before + after, kept["training"], kept["auto"], licence, kept.get("data", [])
+        )
 
     def begin(self, out: Path, name: str, model: torch.nn.Module) -> Path:
         """Fill a model with the averaged weights, write the log, and say where the graph `name` goes.
@@ -106,6 +117,14 @@ class _Run:
         out.mkdir(parents=True, exist_ok=True)
         (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in self.log))
         return out / f"{name}.onnx"
+
+    def terms(self, packs: list[Pack], splits: list[str], mean: Card | None = None) -> dict[str, Any]:
+        """Licence and data for the card: of the packs, of the weights that it started from, and of `mean`."""
+        others = [one for one in (self.licence, mean.licence if mean else "") if one]
+        return {
+            "licence": narrowest([*others, _licence(packs)]),
+            "data": _joined([*self.data, *(mean.data if mean else []), *_data(packs, splits)]),
+        }
 
     def training(self, recipe: str, splits: list[str], model: torch.nn.Module) -> dict[str, Any]:
         """How the weights came to be, for the card."""
@@ -138,8 +157,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         name=name,
         method="cae",
         description=f"{DESCRIPTIONS[name]}, trained on gaps to {longest / 30:g} s",
-        licence=_licence(packs),
-        data=_data(packs, splits),
+        **run.terms(packs, splits),
         tasks=["fill", "recover"],
         joints=list(JOINTS),
         fps=30.0,
@@ -180,8 +198,7 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
         name="seq2seq",
         method="seq2seq",
         description="Residual sequence-to-sequence network (Martinez et al. 2017), to compare forecasts with",
-        licence=_licence(packs),
-        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
         tasks=[],
         joints=list(JOINTS),
         fps=30.0,
@@ -207,8 +224,7 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         name="cmib",
         method="cmib",
         description="Conditional motion in-betweening (Kim et al. 2022) between keys, with action labels",
-        licence=_licence(packs),
-        data=_data(packs, splits),
+        **run.terms(packs, splits),
         tasks=["fill", "between"],
         joints=list(JOINTS),
         fps=30.0,
@@ -247,8 +263,7 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         name=name,
         method="stmi-gan",
         description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
-        licence=_licence(packs),
-        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
         # In the paper there are no gaps between poses, nor in its configuration.
         tasks=["forecast", "recover", *(["fill"] if settings["config"] == "dense" else [])],
         joints=list(JOINTS),
@@ -266,22 +281,21 @@ def export_base(
     packs: list[Pack],
     out: Path,
     splits: list[str],
-    licence: str | None = None,
     mean: Card | None = None,
-    before: Card | None = None,
 ) -> Card:
     """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
 
-    licence: what the weights may be used for, where the packs do not decide.
     mean: weights of the same network that the run started from, whose mean with the run's is written
         (Wortsman et al. 2022): what the run learned at the cost of something else, it keeps half of. They are
         measured anew, on the packs' validation performers.
-    before: weights that the run started from and whose data is not among the packs: the card names it, too.
     """
     run = _Run.of(folder)
     settings, log = run.settings, run.log
     network = settings.pop("network")
-    name, labels = title(settings["config"], settings["datasets"]), network["labels"]
+    learned = chosen(packs, settings["datasets"])
+    terms = run.terms(learned, splits, mean)
+    name = title(settings["config"], settings["datasets"], terms["licence"].startswith(OPEN))
+    labels = network["labels"]
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
     path, measured = run.begin(out, name, model), log[-1]
     if mean:
@@ -290,13 +304,11 @@ def export_base(
     export_base_onnx(model, path)
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
-    packs = chosen(packs, settings["datasets"])
     card = Card(
         name=name,
         method=name if name in METHODS else "small",  # which runs networks of that kind, of any size
         description="interpose's own network: whatever is missing of a motion",
-        licence=licence or _licence(packs),
-        data=[*(before.data if before else []), *_data(packs, splits)],
+        **terms,
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
         fps=30.0,
@@ -336,8 +348,31 @@ def paces(packs: list[Pack], splits: list[str]) -> dict[str, list[float]]:
     }
 
 
+def narrowest(licences: list[str]) -> str:
+    """What may be done with what has all of these licences: research alone if one says so, and all of what
+    they add after a semicolon."""
+    uses, more = zip(*(one.partition("; ")[::2] for one in licences))
+    narrow = [use for use in uses if not use.startswith(OPEN)] or uses[:1]
+    return "; ".join(dict.fromkeys([*narrow, *filter(None, more)]))
+
+
 def _licence(packs: list[Pack]) -> str:
-    return f"{OPEN}: trained on CMU data alone" if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH
+    """What may be done with weights that learned from the packs alone."""
+    names = {str(pack.dataset) for pack in packs}
+    if names == {OWN}:
+        return f"{OPEN}; and what your own clips allow"
+    return FREE if names == {"cmu"} else RESEARCH
+
+
+def _joined(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Data of one run after the other: of a set the most that one of them saw. A user's own clips are a set
+    each time that they are others."""
+    kept: dict[Any, dict[str, Any]] = {}
+    for one in data:
+        key = (OWN, one["clips"], one["frames"]) if one["name"] == OWN else one["name"]
+        kept[key] = max(kept.get(key, one), one, key=lambda some: some["frames"])
+    order = [*DATASETS, OWN]
+    return sorted(kept.values(), key=lambda one: order.index(one["name"]))
 
 
 def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
@@ -348,7 +383,7 @@ def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
         frames = int(np.diff(pack.starts)[kept].sum())
         name = str(pack.dataset)
         data.append({"name": name, "licence": LICENCES[name], "clips": int(kept.sum()), "frames": frames})
-    return sorted(data, key=lambda one: [*DATASETS, OWN].index(one["name"]))
+    return data
 
 
 def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ...], out: Path) -> None:

@@ -220,7 +220,12 @@ class Trainer:
         """Keep the history of the weights that the run starts from, for the card of what comes out."""
         if rank() == 0:
             history = [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
-            kept = {"training": history, "auto": start.auto}
+            kept = {
+                "training": history,
+                "auto": start.auto,
+                "licence": start.licence,
+                "data": start.data,
+            }
             (self.folder / "earlier.json").write_text(json.dumps(kept, indent=2) + "\n")
             log = start.path.with_name("log.jsonl")
             (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
