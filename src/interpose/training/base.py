@@ -26,7 +26,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import Settings, Trainer, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -385,6 +385,7 @@ def train_base(
         optimizer=optimizer,
         clip=1.0,
         about={"network": asdict(model.config)},
+        data=taught(kept, splits),
     )
     return trainer.go(
         f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}", start

@@ -37,7 +37,7 @@ from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import Settings, Trainer, from_weights, restore, taught
 from interpose.training.windows import Windows
 
 NETWORKS: dict[str, Callable[[], Infiller]] = {
@@ -197,7 +197,7 @@ def train_cae(
         say: told how it goes.
     """
     settings = settings or CaeSettings()
-    settings = settings.going_on() if start else settings
+    settings = settings.going_on() if from_weights(folder, start) else settings
     device = pick_device()
     torch.manual_seed(settings.seed)
     rng = np.random.default_rng(settings.seed)
@@ -232,7 +232,14 @@ def train_cae(
         return wrong + settings.bones * bone_error(model, answer.float(), truth) if settings.bones else wrong
 
     trainer = Trainer(
-        model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say
+        model,
+        loss,
+        lambda averaged: validate(averaged, held_out),
+        folder,
+        budget,
+        settings,
+        say,
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{settings.network}, {windows.frames:,} frames of {', '.join(splits)}, on {device}", start

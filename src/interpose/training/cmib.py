@@ -17,7 +17,7 @@ from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import Settings, Trainer, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
 
@@ -179,6 +179,7 @@ def train_cmib(
         optimizer=optimizer,
         clip=1.0,
         about={"config": asdict(model.config)},
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -60,6 +61,8 @@ class _Run:
 
     Attributes:
         folder: where it lies.
+        packs: what it learned from.
+        splits: the parts of them.
         settings: its own.
         log: after that of the weights that it started from.
         earlier: what their card said of their training.
@@ -71,6 +74,8 @@ class _Run:
     """
 
     folder: Path
+    packs: list[Pack]
+    splits: list[str]
     settings: dict[str, Any]
     log: list[dict[str, Any]]
     earlier: list[dict[str, Any]]
@@ -79,15 +84,24 @@ class _Run:
     data: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, folder: Path) -> _Run:
-        """Read it."""
+    def of(cls, folder: Path, packs: list[Pack], splits: Sequence[str]) -> _Run:
+        """Read it. `packs` are those that there are, `splits` those of a run that has none on record."""
 
         def lines(name: str) -> list[dict[str, Any]]:
             return [json.loads(line) for line in (folder / name).read_text().splitlines()]
 
         settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+        packs = chosen(packs, ",".join(settings.pop("packs", [])))
+        kept_splits = settings.pop("splits", None)
+        if kept_splits and splits and {*kept_splits} != {*splits}:
+            raise RequestError(
+                f"{folder} was not trained on {','.join(splits)}",
+                f"it has {','.join(kept_splits)} on record",
+                "Leave out --splits.",
+            )
+        known = (folder, packs, kept_splits or list(splits) or ["train"], settings)
         if not (folder / "earlier.json").exists():
-            return cls(folder, settings, lines("log.jsonl"), [], {"from_gap": 61})
+            return cls(*known, lines("log.jsonl"), [], {"from_gap": 61})
         before = lines("earlier.jsonl")
         steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
         after = [
@@ -99,9 +113,7 @@ class _Run:
         # that is CMU each time, as `small-open` was trained, nothing else can be in it.
         alone = all(one.get("datasets") == "cmu" for one in kept["training"])
         licence = kept.get("licence") or (FREE if alone else RESEARCH)
-        return cls(
-            folder, settings, before + after, kept["training"], kept["auto"], licence, kept.get("data", [])
-        )
+        return cls(*known, before + after, kept["training"], kept["auto"], licence, kept.get("data", []))
 
     def begin(self, out: Path, name: str, model: torch.nn.Module) -> Path:
         """Fill a model with the averaged weights, write the log, and say where the graph `name` goes.
@@ -118,21 +130,21 @@ class _Run:
         (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in self.log))
         return out / f"{name}.onnx"
 
-    def terms(self, packs: list[Pack], splits: list[str], mean: Card | None = None) -> dict[str, Any]:
+    def terms(self, mean: Card | None = None) -> dict[str, Any]:
         """Licence and data for the card: of the packs, of the weights that it started from, and of `mean`."""
         others = [one for one in (self.licence, mean.licence if mean else "") if one]
         return {
-            "licence": narrowest([*others, _licence(packs)]),
-            "data": _joined([*self.data, *(mean.data if mean else []), *_data(packs, splits)]),
+            "licence": narrowest([*others, _licence(self.packs)]),
+            "data": _joined([*self.data, *(mean.data if mean else []), *_data(self.packs, self.splits)]),
         }
 
-    def training(self, recipe: str, splits: list[str], model: torch.nn.Module) -> dict[str, Any]:
+    def training(self, recipe: str, model: torch.nn.Module) -> dict[str, Any]:
         """How the weights came to be, for the card."""
         return {
             "recipe": f"interpose train {recipe}"
             + (", going on from what `earlier` tells of" if self.earlier else ""),
             **self.settings,
-            "splits": splits,
+            "splits": self.splits,
             "steps": self.log[-1]["step"],
             "device_hours": self.log[-1]["hours"],  # from the first start on, as the steps
             "earlier": self.earlier,
@@ -141,12 +153,12 @@ class _Run:
         }
 
 
-def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_cae(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder.
 
     A run of one of the networks to compare with is called after that network instead.
     """
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     name = settings.get("network", "cae")
     model = NETWORKS[name]()
@@ -157,7 +169,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         name=name,
         method="cae",
         description=f"{DESCRIPTIONS[name]}, trained on gaps to {longest / 30:g} s",
-        **run.terms(packs, splits),
+        **run.terms(),
         tasks=["fill", "recover"],
         joints=list(JOINTS),
         fps=30.0,
@@ -165,7 +177,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         # validation performers, whom its last runs had seen, are off by 22, not 39 cm (bench context).
         max_gap=2 * longest,
         training={
-            **run.training("cae", splits, model),
+            **run.training("cae", model),
             "statistics": {
                 "mean": [round(float(v), 6) for v in model.mean.flatten()],
                 "std": [round(float(v), 6) for v in model.std.flatten()],
@@ -178,9 +190,10 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     return card
 
 
-def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `seq2seq.onnx`, `seq2seq.json`, the log and its curves into `out` from a run's folder."""
-    run = _Run.of(folder)
+    packs = [pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS]
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = settings.pop("config")
     model = Seq2Seq(Seq2SeqConfig(**{**config, "labels": tuple(config["labels"])}))
@@ -198,12 +211,12 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
         name="seq2seq",
         method="seq2seq",
         description="Residual sequence-to-sequence network (Martinez et al. 2017), to compare forecasts with",
-        **run.terms([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms(),
         tasks=[],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=0,
-        training=run.training("seq2seq", splits, model),
+        training=run.training("seq2seq", model),
         metrics={"validation": log[-1]},
         labels=config["labels"],
     )
@@ -211,9 +224,9 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
     return card
 
 
-def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `cmib.onnx`, `cmib.json`, the training log and its curves into `out` from a run's folder."""
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = settings.pop("config")
     model = Cmib(CmibConfig(**{**config, "labels": tuple(config["labels"])}))
@@ -224,25 +237,26 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         name="cmib",
         method="cmib",
         description="Conditional motion in-betweening (Kim et al. 2022) between keys, with action labels",
-        **run.terms(packs, splits),
+        **run.terms(),
         tasks=["fill", "between"],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=settings["longest"] - 2,  # a length counts both keys
-        training={**run.training("cmib", splits, model), "config": config},
+        training={**run.training("cmib", model), "config": config},
         metrics={"validation": log[-1]},
         labels=labels,
-        paces=paces(packs, splits),
+        paces=paces(run.packs, run.splits),
     )
     card.save(out / "cmib.json")
     return card
 
 
-def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder, and the
     discriminator, against which a run that starts from these weights goes on. Those of `config=dense` are
     called stmi-gan-dense."""
-    run = _Run.of(folder)
+    packs = [pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS]
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = StmiGanConfig.of(settings["network"])
     model, name = Generator(config), "stmi-gan-dense" if settings["config"] == "dense" else "stmi-gan"
@@ -263,13 +277,13 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         name=name,
         method="stmi-gan",
         description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
-        **run.terms([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms(),
         # In the paper there are no gaps between poses, nor in its configuration.
         tasks=["forecast", "recover", *(["fill"] if settings["config"] == "dense" else [])],
         joints=list(JOINTS),
         fps=config.fps,
         max_gap=config.frames // 2,
-        training=run.training("stmi-gan", splits, model),
+        training=run.training("stmi-gan", model),
         metrics={"validation": log[-1]},
     )
     card.save(out / f"{name}.json")
@@ -280,7 +294,7 @@ def export_base(
     folder: Path,
     packs: list[Pack],
     out: Path,
-    splits: list[str],
+    splits: Sequence[str] = (),
     mean: Card | None = None,
 ) -> Card:
     """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
@@ -289,11 +303,11 @@ def export_base(
         (Wortsman et al. 2022): what the run learned at the cost of something else, it keeps half of. They are
         measured anew, on the packs' validation performers.
     """
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     network = settings.pop("network")
-    learned = chosen(packs, settings["datasets"])
-    terms = run.terms(learned, splits, mean)
+    run.packs = chosen(run.packs, settings["datasets"])  # for runs that have none on record
+    terms = run.terms(mean)
     name = title(settings["config"], settings["datasets"], terms["licence"].startswith(OPEN))
     labels = network["labels"]
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
@@ -313,7 +327,7 @@ def export_base(
         joints=list(JOINTS),
         fps=30.0,
         max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
-        training={**run.training("base", splits, model), "network": network},
+        training={**run.training("base", model), "network": network},
         metrics={"validation": measured},
         auto=run.auto,
         labels=labels,

@@ -11,7 +11,7 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from importlib.util import find_spec
 from pathlib import Path
@@ -22,6 +22,7 @@ import torch
 from torch import Tensor, nn
 from torch import distributed as dist
 
+from interpose.datasets import Pack
 from interpose.errors import FileError, RequestError
 from interpose.methods.weights import Card
 from interpose.training.budget import Budget
@@ -151,6 +152,50 @@ def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in names}
 
 
+def _listed(values: dict[str, Any]) -> str:
+    """name=value, as options say it."""
+    texts = {name: ",".join(map(str, v)) if isinstance(v, list) else v for name, v in values.items()}
+    return ", ".join(f"{name}={text}" for name, text in texts.items())
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all: other processes of the run read it."""
+    new = path.with_name(path.name + ".new")
+    new.write_text(text)
+    os.replace(new, path)
+
+
+def taught(packs: Sequence[Pack], splits: Sequence[str]) -> dict[str, Any]:
+    """What a run learns from, for its record."""
+    return {"packs": sorted(str(pack.dataset) for pack in packs), "splits": sorted({*splits})}
+
+
+def recorded(folder: Path) -> dict[str, Any] | None:
+    """What is on record of the run that goes on in a folder; None where none has begun."""
+    path = folder / "checkpoint.pt"
+    if not path.exists():
+        return None
+    try:
+        kept: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+        return kept
+    except (OSError, ValueError):
+        raise FileError(
+            f"cannot go on from {path}",
+            "settings.json beside it, which says of what it is, is missing or damaged",
+            "Delete it or name another folder.",
+        ) from None
+
+
+def from_weights(folder: Path, start: Card | None) -> bool:
+    """Whether a run starts from weights, or goes on and did so; then `start` need not be named again."""
+    return bool(start) or (recorded(folder) is not None and (folder / "earlier.json").exists())
+
+
+def _history(start: Card) -> list[dict[str, Any]]:
+    """How weights came to be, from the first run on."""
+    return [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
+
+
 class Trainer:
     """Runs one recipe in one folder: `checkpoint.pt`, `averaged.pt` and `log.jsonl` are in there.
 
@@ -165,6 +210,7 @@ class Trainer:
         clip: the largest norm of the gradients.
         about: what else the card should say of the model; kept with the settings.
         opponent: a network that the model plays against, for adversarial training.
+        data: what it learns from, as `taught` says.
     """
 
     def __init__(
@@ -180,6 +226,7 @@ class Trainer:
         clip: float | None = None,
         about: dict[str, Any] | None = None,
         opponent: Opponent | None = None,
+        data: dict[str, Any] | None = None,
     ) -> None:
         self.model, self.loss, self.validate = model, loss, validate
         self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
@@ -188,7 +235,7 @@ class Trainer:
             lambda some: torch.optim.Adam(some, settings.learning_rate)
         )
         self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
-        self.opponent = opponent
+        self.opponent, self.data = opponent, data or {}
         self.board: Any = None  # TensorBoard's, where it is installed
         self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
         # Every process draws batches of its own.
@@ -196,10 +243,14 @@ class Trainer:
         folder.mkdir(parents=True, exist_ok=True)
 
     def resume(self) -> bool:
-        """Go on where an interrupted run stopped, when the folder holds one."""
-        path = self.folder / "checkpoint.pt"
-        if not path.exists():
+        """Go on where an interrupted run stopped, when the folder holds one.
+
+        RequestError where it would go on with another recipe: the card tells of one.
+        """
+        path, kept = self.folder / "checkpoint.pt", recorded(self.folder)
+        if kept is None:
             return False
+        self._stay(kept)
         try:
             state = torch.load(path, map_location=self.device, weights_only=False)
             self.model.load_state_dict(state["model"])
@@ -216,17 +267,45 @@ class Trainer:
         self.budget.spent_seconds, self.budget.spent_steps = state["seconds"], state["steps"]
         return True
 
+    def _stay(self, kept: dict[str, Any]) -> None:
+        """Compare with what is on record; older runs have less of it there."""
+        recipe = _without(asdict(self.settings), "every_seconds")
+        asked = json.loads(json.dumps({**recipe, **self.data}))
+        others = {name: value for name, value in asked.items() if kept.get(name, value) != value}
+        if others:
+            raise RequestError(
+                f"the run in {self.folder} cannot go on with {_listed(others)}",
+                f"it began with {_listed({name: kept[name] for name in others})}",
+                "Repeat that (--set, --splits, --packs), or name another --out.",
+            )
+        # What the first part of such a run learned from is not known.
+        self.data = {name: value for name, value in self.data.items() if name in kept}
+
+    def _begin(self, start: Card | None) -> None:
+        """Keep where the run starts, unless it goes on. RequestError where it started elsewhere."""
+        path = self.folder / "earlier.json"
+        if recorded(self.folder) is None:
+            if rank() == 0 and not start:
+                path.unlink(missing_ok=True)  # of a run that never came to save anything
+        elif start and not (path.exists() and json.loads(path.read_text())["training"] == _history(start)):
+            raise RequestError(
+                f"the run in {self.folder} cannot go on from {start.name}",
+                f"it began with {'other weights' if path.exists() else 'none'}",
+                "Name another --out, or leave out --start where it was given.",
+            )
+        if start:
+            self.follow(start)
+
     def follow(self, start: Card) -> None:
         """Keep the history of the weights that the run starts from, for the card of what comes out."""
         if rank() == 0:
-            history = [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
             kept = {
-                "training": history,
+                "training": _history(start),
                 "auto": start.auto,
                 "licence": start.licence,
                 "data": start.data,
             }
-            (self.folder / "earlier.json").write_text(json.dumps(kept, indent=2) + "\n")
+            _write(self.folder / "earlier.json", json.dumps(kept, indent=2) + "\n")
             log = start.path.with_name("log.jsonl")
             (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
 
@@ -237,8 +316,8 @@ class Trainer:
             what: in words.
             start: the weights that the model was filled with, if any.
         """
+        self._begin(start)
         if start:
-            self.follow(start)
             # Else weights that were trained with the same seed would learn from the same batches once more.
             self.rng = np.random.default_rng([self.settings.seed, rank(), start.training.get("steps", 0)])
         self.say(what)
@@ -284,16 +363,18 @@ class Trainer:
         Asked to stop, by Ctrl-C or a signal to terminate, it ends the step and saves; then the signal does
         what it does without a run: KeyboardInterrupt, or the end of the process.
         """
-        if rank() == 0:
+        # Where nothing is left to do, what was done stays on record.
+        if rank() == 0 and self.budget.fraction < 1:
             kept = {
                 **asdict(self.settings),
                 **self.about,
+                **self.data,
                 "budget": str(self.budget),
                 "processes": processes(),
                 "device": torch.cuda.get_device_name() if self.device.type == "cuda" else "CPU",
             }
             kept["commit"] = commit()
-            (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
+            _write(self.folder / "settings.json", json.dumps(kept, indent=2) + "\n")
         # What is drawn on the device differs between processes, and is not drawn again by a run that goes on.
         own = np.random.SeedSequence([self.settings.seed, rank(), self.budget.spent_steps])
         torch.manual_seed(int(own.generate_state(1)[0]))

@@ -22,7 +22,7 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig, from_values, to_val
 from interpose.skeletons import PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import Settings, Trainer, restore, taught
 from interpose.training.poses import Batch, Poses, labels_of
 from interpose.training.stmi_gan import DATASETS
 
@@ -84,6 +84,7 @@ def train_seq2seq(
         say,
         clip=5.0,
         about={"config": asdict(model.config)},
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start

@@ -48,7 +48,7 @@ from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Opponent, Settings, Trainer, restore
+from interpose.training.loop import Opponent, Settings, Trainer, restore, taught
 from interpose.training.windows import Windows
 
 DATASETS = ("lafan1", "bandai")
@@ -331,6 +331,7 @@ def train_stmi_gan(
         say,
         optimizer=optimizer,
         about={"network": asdict(settings.network)},
+        data=taught(packs, splits),
         opponent=opponent if settings.looks else None,
     )
     return trainer.go(
