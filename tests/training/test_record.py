@@ -3,19 +3,25 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
 pytest.importorskip("onnx")
 
+from safetensors.torch import save_file  # noqa: E402
+
 from interpose.cli import main  # noqa: E402
 from interpose.errors import FileError, RequestError  # noqa: E402
 from interpose.methods import weights  # noqa: E402
+from interpose.models.base import Base, BaseConfig  # noqa: E402
 from interpose.training import cae, export  # noqa: E402
+from interpose.training.base import BaseSettings, train_base  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
+from interpose.training.cmib import CmibSettings, train_cmib  # noqa: E402
 from interpose.training.loop import Settings, Trainer  # noqa: E402
 
 START = weights.Card(
@@ -103,6 +109,46 @@ def test_an_autoencoder_that_started_from_weights_goes_on_as_it_did(walk_pack, t
         cae.train_cae([walk_pack("cmu")], tmp_path, Budget.parse(steps), settings, start=begin, say=str)
         kept = json.loads((tmp_path / "settings.json").read_text())
         assert (kept["first_gap"], kept["budget"]) == (settings.last_gap, f"{steps[0]} steps")
+
+
+def two_labels(walk_pack):  # type: ignore[no-untyped-def]
+    """A pack whose labels the weights below know in another order than sorted."""
+    return replace(walk_pack("lafan1", both=True), labels=np.array(["bow", "walk"]))
+
+
+def kept_at_each_step(recipe, pack, folder, settings, start, name):  # type: ignore[no-untyped-def]
+    """What is on record of the network, as the run starts, goes on, and goes on with --start said again."""
+    for number, begin in enumerate((start, None, start), 1):
+        budget = Budget.parse(f"{number}steps")
+        recipe([pack], folder, budget, settings, ("train", "validation"), begin, say=str)
+        yield json.loads((folder / "settings.json").read_text())[name]
+
+
+def test_labels_and_wires_stay_as_they_are(walk_pack, tmp_path):
+    """No weight of the checkpoint tells which row is whose, nor how it is wired."""
+    network = BaseConfig(("", "walk", "bow"), width=24, heads=2, layers=1, near=False)
+    save_file(Base(network).state_dict(), tmp_path / "tiny.safetensors")
+    training = {"config": "small", "network": {**asdict(network), "labels": None}}
+    start = replace(START, labels=["", "walk", "bow"], training=training, path=tmp_path / "tiny.json")
+    settings = BaseSettings(batch=2, longest=20)
+    steps = kept_at_each_step(train_base, two_labels(walk_pack), tmp_path / "run", settings, start, "network")
+    for kept in steps:
+        assert (kept["labels"], kept["near"], kept["heads"]) == (["", "walk", "bow"], False, 2)
+
+
+def test_labels_of_cmib_stay_in_their_order(walk_pack, tmp_path):
+    pack = two_labels(walk_pack)
+    settings, start = CmibSettings(batch=2, shortest=10, longest=122), weights.find("cmib")
+    assert start.labels.index("walk") > 1
+    for kept in kept_at_each_step(train_cmib, pack, tmp_path, settings, start, "config"):
+        assert kept["labels"][: len(start.labels)] == start.labels
+
+
+def test_data_with_more_labels_does_not_change_those_of_a_run_that_goes_on(walk_pack, tmp_path):
+    settings = BaseSettings(width=24, layers=1, batch=2, longest=20)
+    for steps, pack in (("1steps", walk_pack("lafan1", both=True)), ("2steps", two_labels(walk_pack))):
+        model = train_base([pack], tmp_path, Budget.parse(steps), settings, say=str)
+        assert model.config.labels == ("", "walk")
 
 
 def test_splits_are_told_once(walk_pack, tmp_path, capsys, monkeypatch):

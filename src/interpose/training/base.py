@@ -26,7 +26,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore, taught
+from interpose.training.loop import Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -311,6 +311,24 @@ def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:
     return [held[name] for name in names.split(",")]
 
 
+def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -> Base:
+    """The network of a run that begins: a new one, or that of `start`, larger where that is asked for."""
+    asked = settings.network(labels)
+    if not start:
+        return Base(asked)
+    # What a network is wired like has no weights of its own that could tell.
+    wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout}
+    model = Base(BaseConfig(**wired))
+    restore(model, start.onnx)
+    # Larger than they were only where that is asked for: by name, or by its width.
+    larger = settings.width or settings.config != start.training["config"]
+    if not (larger and asked.width > model.config.width):
+        return model
+    grown = Base(replace(model.config, width=asked.width, heads=asked.heads, layers=asked.layers))
+    grown.grow(model)
+    return grown
+
+
 def train_base(
     packs: Sequence[Pack],
     folder: Path,
@@ -325,28 +343,18 @@ def train_base(
     device = pick_device()
     torch.manual_seed(settings.seed)
     kept = chosen(packs, settings.datasets)
-    labels = labels_of(kept, splits, start.labels if start else ("",))
+    # How it is wired, and which row of the embedding is which label, no weight could tell.
+    before = recorded(folder, "network")
+    labels = tuple(before["labels"]) if before else labels_of(kept, splits, start.labels if start else ("",))
     poses = Poses(kept, splits, labels, SHORTEST, device)
     # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
-    asked = settings.network(labels)
-    # What a network is wired like has no weights of its own that could tell.
-    wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout} if start else {}
-    network = BaseConfig(**wired) if start else asked
-    model = Base(network)
-    if start:
-        restore(model, start.onnx)
-    # Larger than they were only where that is asked for: by name, or by its width.
-    larger = start and (settings.width or settings.config != start.training["config"])
-    if larger and asked.width > network.width:
-        network = replace(network, width=asked.width, heads=asked.heads, layers=asked.layers)
-        smaller, model = model, Base(network)
-        model.grow(smaller)
+    model = Base(BaseConfig(**{**before, "labels": labels})) if before else begin(settings, labels, start)
     model = model.to(device)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
     # No longer than the network can see with what is around them; nor, where all clips are short, as a user's
     # own may be, than fit into them.
-    room = min(network.longest, int(poses.counts.max())) - 2 * settings.context
+    room = min(model.config.longest, int(poses.counts.max())) - 2 * settings.context
     fit = max(1, min(settings.longest, room))
     drawing = replace(settings, longest=fit)
 

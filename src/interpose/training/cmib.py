@@ -17,7 +17,7 @@ from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore, taught
+from interpose.training.loop import Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
 
@@ -130,7 +130,9 @@ def train_cmib(
             "Choose --set longest=131 or less.",
         )
     torch.manual_seed(settings.seed)
-    labels = labels_of(packs, splits, start.labels if start else ("",))
+    # Which row of the embedding is which label, no weight could tell.
+    before = recorded(folder, "config")
+    labels = tuple(before["labels"]) if before else labels_of(packs, splits, start.labels if start else ("",))
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6
@@ -142,9 +144,9 @@ def train_cmib(
         representation=settings.representation,
     )
     model = Cmib(config).to(device)
-    if start:
+    if start and not before:
         restore(model, start.onnx)
-    elif model.config.residual:
+    elif not before and model.config.residual:
         model.encoder.standardise(sample_frames(model, poses, settings))
     losses = Losses(model, settings)
     moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)

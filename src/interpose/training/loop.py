@@ -170,15 +170,16 @@ def taught(packs: Sequence[Pack], splits: Sequence[str]) -> dict[str, Any]:
     return {"packs": sorted(str(pack.dataset) for pack in packs), "splits": sorted({*splits})}
 
 
-def recorded(folder: Path) -> dict[str, Any] | None:
-    """What is on record of the run that goes on in a folder; None where none has begun."""
+def recorded(folder: Path, network: str = "") -> dict[str, Any] | None:
+    """What is on record of the run that goes on in a folder, under the name `network` what its network is, if
+    that is asked for; None where none has begun."""
     path = folder / "checkpoint.pt"
     if not path.exists():
         return None
     try:
         kept: dict[str, Any] = json.loads((folder / "settings.json").read_text())
-        return kept
-    except (OSError, ValueError):
+        return kept[network] if network else kept
+    except (OSError, ValueError, KeyError):
         raise FileError(
             f"cannot go on from {path}",
             "settings.json beside it, which says of what it is, is missing or damaged",
