@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -26,7 +27,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, recorded, restore, taught
+from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -76,6 +77,19 @@ TASKS: dict[str, dict[str, float]] = {
 class BaseSettings(Settings):
     """The recipe."""
 
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "shortest": SOME,
+        "longest": SOME,
+        "short": (-10, 10),  # beyond that all gaps are the shortest, or the longest
+        "context": (1, (BaseConfig().longest - 1) // 2),  # the network sees it on both sides of a gap
+        "labelled": SHARE,
+        "dropout": (0, 0.9),
+        **dict.fromkeys(
+            ("muon", "mirror", "residual", "velocities", "near", "apart", "distances", "room"), SWITCH
+        ),
+    }
+
     config: str = "small"  # one of CONFIGS
     tasks: str = "all"  # one of TASKS
     datasets: str = ""  # names separated by commas; all packs without any
@@ -121,18 +135,18 @@ class BaseSettings(Settings):
 
     def network(self, labels: tuple[str, ...]) -> BaseConfig:
         base = CONFIGS[self.config]
-        heads = self.heads or base.heads
-        if self.width % heads:
+        heads, width = self.heads or base.heads, self.width or base.width
+        if width % heads:
             raise RequestError(
-                f"a network cannot be {self.width} wide",
+                f"a network cannot be {width} wide",
                 f"its {heads} heads share the width evenly",
-                f"Write --set width={heads * max(1, round(self.width / heads))}.",
+                f"Write --set width={heads * max(1, round(width / heads))}.",
             )
         return replace(
             base,
             labels=labels,
             dropout=self.dropout,
-            width=self.width or base.width,
+            width=width,
             heads=heads,
             layers=self.layers or base.layers,
             residual=bool(self.residual),
@@ -356,6 +370,12 @@ def train_base(
     # own may be, than fit into them.
     room = min(model.config.longest, int(poses.counts.max())) - 2 * settings.context
     fit = max(1, min(settings.longest, room))
+    if settings.shortest > fit:
+        raise RequestError(
+            f"cannot learn from gaps of {settings.shortest} frames and more",
+            f"with {settings.context} on either side, clips and network have room for {fit}",
+            f"Write --set shortest={fit} or less, or a smaller --set context.",
+        )
     drawing = replace(settings, longest=fit)
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:

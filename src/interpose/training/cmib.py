@@ -5,26 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from interpose.datasets import Pack
-from interpose.errors import RequestError
+from interpose.errors import unknown
 from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, recorded, restore, taught
+from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
+
+REPRESENTATIONS = ("quaternion", "axis-angle", "euler")
 
 
 @dataclass
 class CmibSettings(Settings):
     """The paper's recipe where it says one; a small budget wants a higher learning rate than its .0001."""
+
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "shortest": (3, CmibConfig().longest),  # two keys, and something between them
+        "longest": (3, CmibConfig().longest),
+        "anchors": SOME,
+        "dropout": (0, 0.9),
+        **dict.fromkeys(("anchored", "augmented", "labelled"), SHARE),
+        **dict.fromkeys(("residual", "muon"), SWITCH),
+    }
 
     learning_rate: float = 1e-3
     warm_up: float = 0.03
@@ -40,11 +53,16 @@ class CmibSettings(Settings):
     rotation: float = 2.0
     placed: float = 0.05
     dropout: float = 0.0  # the paper: .05; drawing it takes a third of the time, and the run is short
-    representation: str = "quaternion"  # table 1; also "axis-angle" and "euler"
+    representation: str = "quaternion"  # table 1; one of REPRESENTATIONS
     residual: int = 1  # 0 for the paper's own network
     decay: float = 0.01
     betas: tuple[float, float] = (0.9, 0.99)
     muon: int = 0  # whether Muon moves the matrices of the layers; else AdamW moves all, as in the paper
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.representation not in REPRESENTATIONS:
+            raise unknown("representation", self.representation, REPRESENTATIONS)
 
 
 def draw_length(rng: np.random.Generator, settings: CmibSettings) -> int:
@@ -123,12 +141,6 @@ def train_cmib(
     """Train, or go on training, in `folder`; the averaged model comes back. Arguments as in `train_cae`."""
     settings = settings or CmibSettings()
     device = pick_device()
-    if settings.longest > CmibConfig().longest:
-        raise RequestError(
-            f"cannot learn from {settings.longest} frames",
-            f"the network sees {CmibConfig().longest} at once",
-            "Choose --set longest=131 or less.",
-        )
     torch.manual_seed(settings.seed)
     # Which row of the embedding is which label, no weight could tell.
     before = recorded(folder, "config")

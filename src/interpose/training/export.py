@@ -164,7 +164,8 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str]
     model = NETWORKS[name]()
     export_cae_onnx(model, run.begin(out, name, model))
     _curves(log, name, f"{settings.get('loss', 'l1').upper()}, normalised", (15, 30, 60), out)
-    longest = settings.get("gap") or 60
+    drawn = min(settings.get("last_gap", 60), settings.get("length", 120) - 2)
+    longest = settings.get("gap") or round(drawn)
     card = Card(
         name=name,
         method="cae",

@@ -12,10 +12,10 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
@@ -29,6 +29,9 @@ from interpose.training.budget import Budget
 from interpose.training.device import processes, rank
 from interpose.training.optimizers import Muon
 
+SHARE, SWITCH = (0, 1), (0, 1)
+SOME = (1, math.inf)  # of what is counted
+
 
 @dataclass
 class Settings:
@@ -37,6 +40,14 @@ class Settings:
     The learning rate warms up over the first hundredth of the budget and falls to zero along half a
     cosine over the rest of it; weights are averaged exponentially.
     """
+
+    # The least and the most of settings that are numbers: 0 and anything finite where it is not said.
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
+        "learning_rate": (1e-12, 10),
+        "average": SHARE,
+        "seed": (0, 2**32 - 1),
+        "batch": SOME,
+    }
 
     learning_rate: float = 1e-3
     warm_up: float = 0.01
@@ -49,6 +60,22 @@ class Settings:
         if not 0 < self.warm_up <= 1:
             raise RequestError(
                 f"cannot warm up over {self.warm_up:g} of the budget", "it is a share", "Choose 0.001 to 1."
+            )
+        for one in fields(self):
+            value, (low, high) = getattr(self, one.name), self.LIMITS.get(one.name, (0, math.inf))
+            if isinstance(value, int | float) and not (low <= value <= high and math.isfinite(value)):
+                most = f" to {high:g}" if math.isfinite(high) else " on, and finite"
+                raise RequestError(
+                    f"cannot train with {one.name}={value}",
+                    f"it is a number from {low:g}{most}",
+                    f"Write --set {one.name}={one.default}, as in the recipe, or another one in that range.",
+                )
+        shortest, longest = (getattr(self, name, 0) for name in ("shortest", "longest"))
+        if shortest > longest:
+            raise RequestError(
+                f"cannot train with shortest={shortest}",
+                f"it is more than longest={longest}",
+                "Choose a smaller --set shortest, or a larger --set longest.",
             )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -22,7 +23,7 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig, from_values, to_val
 from interpose.skeletons import PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes
-from interpose.training.loop import Settings, Trainer, recorded, restore, taught
+from interpose.training.loop import SOME, Settings, Trainer, recorded, restore, taught
 from interpose.training.poses import Batch, Poses, labels_of
 from interpose.training.stmi_gan import DATASETS
 
@@ -32,6 +33,8 @@ ROLLED = 120  # frames that are foretold when it is measured, 4 s
 @dataclass
 class Seq2SeqSettings(Settings):
     """The paper's recipe, the optimiser apart."""
+
+    LIMITS: ClassVar = {**Settings.LIMITS, **dict.fromkeys(("seen", "foretold", "units"), SOME)}
 
     learning_rate: float = 5e-4
     batch: int = 16  # of all processes together
