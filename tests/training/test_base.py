@@ -31,7 +31,7 @@ from interpose.models.base import (  # noqa: E402
 from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import JOINTS, PARENTS, find_mapping  # noqa: E402
-from interpose.training import graphs  # noqa: E402
+from interpose.training import export, graphs  # noqa: E402
 from interpose.training.base import (  # noqa: E402
     JUDGED,
     STANDS,
@@ -47,7 +47,7 @@ from interpose.training.base import (  # noqa: E402
     validate,
 )
 from interpose.training.budget import Budget  # noqa: E402
-from interpose.training.export import export_base  # noqa: E402
+from interpose.training.export import export_base, narrowest  # noqa: E402
 from interpose.training.loop import restore, shard_paths  # noqa: E402
 from interpose.training.poses import Poses, labels_of  # noqa: E402
 
@@ -259,6 +259,64 @@ def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path):
     assert made.training["mean_with"].startswith("small of commit")
     log = json.loads((tmp_path / "weights" / "log.jsonl").read_text().splitlines()[-1])
     assert made.metrics["validation"]["gap5"] != log["gap5"], "measured anew"
+
+
+@pytest.fixture
+def tuned(trained, walk_pack, tmp_path_factory, monkeypatch):  # type: ignore[no-untyped-def]
+    """Makes runs on CMU's data alone that started from some weights: from the folder of one to its card."""
+    settings = BaseSettings(datasets="cmu", batch=2, longest=40)
+    packs = [walk_pack("cmu", both=True)]
+
+    def make(**start):  # type: ignore[no-untyped-def]
+        run = tmp_path_factory.mktemp("run")
+        train_base(packs, run, Budget.parse("1steps"), settings, start=replace(trained[0], **start), say=str)
+        return run, lambda **more: export_base(run, packs, run / "weights", ["train"], **more)
+
+    # What counts here is the card.
+    monkeypatch.setattr(export, "export_base_onnx", lambda model, path: path.touch())
+
+    return make
+
+
+def test_a_licence_only_gets_narrower(trained, tuned):
+    """What learned from data for research stays for research, whatever it learns from afterwards."""
+    run, write = tuned()
+    card = write()
+    assert card.licence == trained[0].licence
+    assert not card.open
+    assert (card.name, card.method) == ("small-cmu", "small")
+    assert [one["name"] for one in card.data] == ["lafan1", "cmu"]
+    # Of runs from before licences were kept their history tells it.
+    kept = json.loads((run / "earlier.json").read_text())
+    (run / "earlier.json").write_text(json.dumps({name: kept[name] for name in ("training", "auto")}))
+    assert not write().open
+
+
+def test_what_learned_from_cmu_alone_stays_open(tuned, trained):
+    cmu = [{"name": "cmu", "licence": "", "clips": 100, "frames": 10**6}]
+    free = {
+        "licence": "any use: trained on CMU data alone",
+        "data": cmu,
+        "training": {**trained[0].training, "datasets": "cmu"},
+    }
+    run, write = tuned(**free)
+    card = write()
+    assert (card.name, card.licence, card.data) == ("small-open", free["licence"], cmu)
+    kept = json.loads((run / "earlier.json").read_text())
+    (run / "earlier.json").write_text(json.dumps({name: kept[name] for name in ("training", "auto")}))
+    assert write().open, "its history says CMU all along"
+    (run / "weights" / "small-open.onnx").unlink()
+    mean = write(mean=trained[0])
+    assert (mean.name, mean.licence) == ("small-cmu", trained[0].licence)
+    assert [one["name"] for one in mean.data] == ["lafan1", "cmu"]
+
+
+def test_licences_together():
+    mine = "and what your own clips allow"
+    assert narrowest(["any use: trained on CMU data alone", f"any use; {mine}"]) == (
+        f"any use: trained on CMU data alone; {mine}"
+    )
+    assert narrowest([f"any use; {mine}", "research", f"any use; {mine}"]) == f"research; {mine}"
 
 
 def test_a_run_goes_on_and_is_exported_whole(trained, given):

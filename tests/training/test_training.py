@@ -282,6 +282,7 @@ def test_a_run_that_is_stopped_saves_the_step_that_it_was_at(pack, tmp_path, mon
 
 def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):
     (tmp_path / "checkpoint.pt").write_bytes(b"PK not really")
+    (tmp_path / "settings.json").write_text("{}")
     with pytest.raises(FileError, match="cannot go on"):
         train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2))
 

@@ -32,7 +32,8 @@ class Of:
         "packs"
     )
     splits: Annotated[
-        list[str], Parameter(help="what it was trained on: train (the default), or train,validation.")
+        list[str],
+        Parameter(help="for runs without them on record: train (the default), or train,validation."),
     ] = field(default_factory=list)
     force: Annotated[bool, Parameter(help="replace weights that are there.")] = False
 
@@ -152,12 +153,12 @@ def seq2seq(
 
 def _export(write: Callable[..., Any], of: Of, out: Path) -> None:
     """Export a run as its verb was told."""
-    chosen = check_splits(of.splits)
+    chosen = check_splits(of.splits) if of.splits else ()
     for name in ("averaged.pt", "log.jsonl", "settings.json"):
         if not (of.run / name).is_file():
             raise FileError(f"cannot export {of.run}", f"it has no {name}", "Train first: interpose train.")
     if not of.force and (there := sorted(out.glob("*.onnx"))):
         why = f"{there[0].name} is in there"
         raise FileError(f"cannot write into {out}", why, "Choose another --out, or add --force.")
-    card = write(of.run, load_packs(of.packs), out, list(chosen))
+    card = write(of.run, load_packs(of.packs), out, chosen)
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")

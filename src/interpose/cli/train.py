@@ -113,7 +113,10 @@ def _train(recipe: Callable[..., Any], settings: Any, name: str, run: Run, shipp
     there = Path("weights") / own
     if not shipped or run.set or there.exists():
         there = run.out / "weights"
-    say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}")
+    # Runs from before splits were on record are told them once more.
+    on_record = "splits" in json.loads((run.out / "settings.json").read_text())
+    splits = "" if on_record else f" --splits {','.join(chosen)}"
+    say(f"Next: interpose export {name} --run {run.out} --packs {run.packs} --out {there}{splits}")
 
 
 @train.default
@@ -158,7 +161,7 @@ def own(
         )
     if any(out.glob("*.onnx")):
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
-    asked, allowed = Budget.parse(budget), f"{begin.licence}; and what your own clips allow"
+    asked = Budget.parse(budget)
     # Gently: what it knows of all motion is to stay.
     gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0)
     settings = change(gentle, set)
@@ -178,7 +181,7 @@ def own(
     run.mkdir(parents=True, exist_ok=True)
     (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
-    export_base(run, [pack], out, ["train"], allowed, before=begin)
+    export_base(run, [pack], out)
     before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))
     say()
     rows = [

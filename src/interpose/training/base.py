@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -26,7 +27,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -76,6 +77,19 @@ TASKS: dict[str, dict[str, float]] = {
 class BaseSettings(Settings):
     """The recipe."""
 
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "shortest": SOME,
+        "longest": SOME,
+        "short": (-10, 10),  # beyond that all gaps are the shortest, or the longest
+        "context": (1, (BaseConfig().longest - 1) // 2),  # the network sees it on both sides of a gap
+        "labelled": SHARE,
+        "dropout": (0, 0.9),
+        **dict.fromkeys(
+            ("muon", "mirror", "residual", "velocities", "near", "apart", "distances", "room"), SWITCH
+        ),
+    }
+
     config: str = "small"  # one of CONFIGS
     tasks: str = "all"  # one of TASKS
     datasets: str = ""  # names separated by commas; all packs without any
@@ -121,18 +135,18 @@ class BaseSettings(Settings):
 
     def network(self, labels: tuple[str, ...]) -> BaseConfig:
         base = CONFIGS[self.config]
-        heads = self.heads or base.heads
-        if self.width % heads:
+        heads, width = self.heads or base.heads, self.width or base.width
+        if width % heads:
             raise RequestError(
-                f"a network cannot be {self.width} wide",
+                f"a network cannot be {width} wide",
                 f"its {heads} heads share the width evenly",
-                f"Write --set width={heads * max(1, round(self.width / heads))}.",
+                f"Write --set width={heads * max(1, round(width / heads))}.",
             )
         return replace(
             base,
             labels=labels,
             dropout=self.dropout,
-            width=self.width or base.width,
+            width=width,
             heads=heads,
             layers=self.layers or base.layers,
             residual=bool(self.residual),
@@ -292,10 +306,11 @@ def relief(begun: Tensor, placed: Tensor, known: Tensor) -> Tensor:
     return (off * missing).sum() / missing.sum().clamp(min=1) / TYPICAL + 1e-2
 
 
-def title(config: str, datasets: str) -> str:
+def title(config: str, datasets: str, free: bool = False) -> str:
     """What weights are called: the configuration, and what they were trained on, if not on all; "open" if on
-    what may be used for anything."""
-    return "-".join([config, *({"cmu": "open"}.get(name, name) for name in datasets.split(",") if name)])
+    CMU and they are free for any use."""
+    names = [name for name in datasets.split(",") if name]
+    return "-".join([config, *(["open"] if free and names == ["cmu"] else names)])
 
 
 def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:
@@ -308,6 +323,24 @@ def chosen(packs: Sequence[Pack], names: str) -> list[Pack]:
             f"there is no pack of {bad[0]}", f"there are {', '.join(held)}", "Make it: interpose data pack."
         )
     return [held[name] for name in names.split(",")]
+
+
+def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -> Base:
+    """The network of a run that begins: a new one, or that of `start`, larger where that is asked for."""
+    asked = settings.network(labels)
+    if not start:
+        return Base(asked)
+    # What a network is wired like has no weights of its own that could tell.
+    wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout}
+    model = Base(BaseConfig(**wired))
+    restore(model, start.onnx)
+    # Larger than they were only where that is asked for: by name, or by its width.
+    larger = settings.width or settings.config != start.training["config"]
+    if not (larger and asked.width > model.config.width):
+        return model
+    grown = Base(replace(model.config, width=asked.width, heads=asked.heads, layers=asked.layers))
+    grown.grow(model)
+    return grown
 
 
 def train_base(
@@ -324,29 +357,25 @@ def train_base(
     device = pick_device()
     torch.manual_seed(settings.seed)
     kept = chosen(packs, settings.datasets)
-    labels = labels_of(kept, splits, start.labels if start else ("",))
+    # How it is wired, and which row of the embedding is which label, no weight could tell.
+    before = recorded(folder, "network")
+    labels = tuple(before["labels"]) if before else labels_of(kept, splits, start.labels if start else ("",))
     poses = Poses(kept, splits, labels, SHORTEST, device)
     # Of all data sets, so that runs on some of them can be laid beside those on all.
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
-    asked = settings.network(labels)
-    # What a network is wired like has no weights of its own that could tell.
-    wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout} if start else {}
-    network = BaseConfig(**wired) if start else asked
-    model = Base(network)
-    if start:
-        restore(model, start.onnx)
-    # Larger than they were only where that is asked for: by name, or by its width.
-    larger = start and (settings.width or settings.config != start.training["config"])
-    if larger and asked.width > network.width:
-        network = replace(network, width=asked.width, heads=asked.heads, layers=asked.layers)
-        smaller, model = model, Base(network)
-        model.grow(smaller)
+    model = Base(BaseConfig(**{**before, "labels": labels})) if before else begin(settings, labels, start)
     model = model.to(device)
     losses, batch = Losses(settings), max(1, settings.batch // processes())
     # No longer than the network can see with what is around them; nor, where all clips are short, as a user's
     # own may be, than fit into them.
-    room = min(network.longest, int(poses.counts.max())) - 2 * settings.context
+    room = min(model.config.longest, int(poses.counts.max())) - 2 * settings.context
     fit = max(1, min(settings.longest, room))
+    if settings.shortest > fit:
+        raise RequestError(
+            f"cannot learn from gaps of {settings.shortest} frames and more",
+            f"with {settings.context} on either side, clips and network have room for {fit}",
+            f"Write --set shortest={fit} or less, or a smaller --set context.",
+        )
     drawing = replace(settings, longest=fit)
 
     def loss(rng: np.random.Generator, fraction: float) -> Tensor:
@@ -384,6 +413,7 @@ def train_base(
         optimizer=optimizer,
         clip=1.0,
         about={"network": asdict(model.config)},
+        data=taught(kept, splits),
     )
     return trainer.go(
         f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}", start

@@ -20,13 +20,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from interpose.datasets import Pack
-from interpose.errors import unknown
+from interpose.errors import RequestError, unknown
 from interpose.geometry.ground import wrap
 from interpose.methods.weights import Card
 from interpose.models.cae import ROWS, Image, Infiller, to_image
@@ -37,8 +38,8 @@ from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
-from interpose.training.windows import Windows
+from interpose.training.loop import SHARE, SOME, Settings, Trainer, from_weights, restore, taught
+from interpose.training.windows import SHORTEST, Windows
 
 NETWORKS: dict[str, Callable[[], Infiller]] = {
     "cae": Infiller,
@@ -55,6 +56,16 @@ LOSSES: dict[str, Callable[[Tensor], Tensor]] = {"l1": torch.abs, "l2": torch.sq
 @dataclass
 class CaeSettings(Settings):
     """The paper's recipe; its frame counts are at 60 fps, these at 30."""
+
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "length": (SHORTEST, 10_000),
+        "first_gap": SOME,
+        "last_gap": SOME,
+        "curriculum": (0.001, 1),
+        "joints_share": SHARE,
+        "noise": SHARE,
+    }
 
     length: int = 120  # frames, 4 s
     batch: int = 32  # of all processes together; the paper: 80. A small budget learns more in small steps
@@ -75,6 +86,12 @@ class CaeSettings(Settings):
             raise unknown("network", self.network, NETWORKS)
         if self.loss not in LOSSES:
             raise unknown("loss", self.loss, LOSSES)
+        if self.gap > self.length - 2:
+            raise RequestError(
+                f"cannot train with gaps of {self.gap} frames",
+                f"windows have {self.length}, and the first and the last stay known",
+                f"Write --set gap={self.length - 2} or less, or --set length={self.gap + 2} or more.",
+            )
 
     def going_on(self) -> CaeSettings:
         """For a run from trained weights: the end of the curriculum, and steps half as large."""
@@ -197,7 +214,7 @@ def train_cae(
         say: told how it goes.
     """
     settings = settings or CaeSettings()
-    settings = settings.going_on() if start else settings
+    settings = settings.going_on() if from_weights(folder, start) else settings
     device = pick_device()
     torch.manual_seed(settings.seed)
     rng = np.random.default_rng(settings.seed)
@@ -232,7 +249,14 @@ def train_cae(
         return wrong + settings.bones * bone_error(model, answer.float(), truth) if settings.bones else wrong
 
     trainer = Trainer(
-        model, loss, lambda averaged: validate(averaged, held_out), folder, budget, settings, say
+        model,
+        loss,
+        lambda averaged: validate(averaged, held_out),
+        folder,
+        budget,
+        settings,
+        say,
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{settings.network}, {windows.frames:,} frames of {', '.join(splits)}, on {device}", start

@@ -5,26 +5,39 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
 from interpose.datasets import Pack
-from interpose.errors import RequestError
+from interpose.errors import unknown
 from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
+
+REPRESENTATIONS = ("quaternion", "axis-angle", "euler")
 
 
 @dataclass
 class CmibSettings(Settings):
     """The paper's recipe where it says one; a small budget wants a higher learning rate than its .0001."""
+
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "shortest": (3, CmibConfig().longest),  # two keys, and something between them
+        "longest": (3, CmibConfig().longest),
+        "anchors": SOME,
+        "dropout": (0, 0.9),
+        **dict.fromkeys(("anchored", "augmented", "labelled"), SHARE),
+        **dict.fromkeys(("residual", "muon"), SWITCH),
+    }
 
     learning_rate: float = 1e-3
     warm_up: float = 0.03
@@ -40,11 +53,16 @@ class CmibSettings(Settings):
     rotation: float = 2.0
     placed: float = 0.05
     dropout: float = 0.0  # the paper: .05; drawing it takes a third of the time, and the run is short
-    representation: str = "quaternion"  # table 1; also "axis-angle" and "euler"
+    representation: str = "quaternion"  # table 1; one of REPRESENTATIONS
     residual: int = 1  # 0 for the paper's own network
     decay: float = 0.01
     betas: tuple[float, float] = (0.9, 0.99)
     muon: int = 0  # whether Muon moves the matrices of the layers; else AdamW moves all, as in the paper
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.representation not in REPRESENTATIONS:
+            raise unknown("representation", self.representation, REPRESENTATIONS)
 
 
 def draw_length(rng: np.random.Generator, settings: CmibSettings) -> int:
@@ -123,14 +141,10 @@ def train_cmib(
     """Train, or go on training, in `folder`; the averaged model comes back. Arguments as in `train_cae`."""
     settings = settings or CmibSettings()
     device = pick_device()
-    if settings.longest > CmibConfig().longest:
-        raise RequestError(
-            f"cannot learn from {settings.longest} frames",
-            f"the network sees {CmibConfig().longest} at once",
-            "Choose --set longest=131 or less.",
-        )
     torch.manual_seed(settings.seed)
-    labels = labels_of(packs, splits, start.labels if start else ("",))
+    # Which row of the embedding is which label, no weight could tell.
+    before = recorded(folder, "config")
+    labels = tuple(before["labels"]) if before else labels_of(packs, splits, start.labels if start else ("",))
     poses = Poses(packs, splits, labels, settings.longest, device)
     held_out = Poses(packs, ("validation",), labels, settings.longest, device).spread(64, 120)
     heads = 7 if settings.representation == "quaternion" else 6
@@ -142,9 +156,9 @@ def train_cmib(
         representation=settings.representation,
     )
     model = Cmib(config).to(device)
-    if start:
+    if start and not before:
         restore(model, start.onnx)
-    elif model.config.residual:
+    elif not before and model.config.residual:
         model.encoder.standardise(sample_frames(model, poses, settings))
     losses = Losses(model, settings)
     moving = torch.tensor([name in ("walk", "run", "locomotion") for name in labels], device=device)
@@ -179,6 +193,7 @@ def train_cmib(
         optimizer=optimizer,
         clip=1.0,
         about={"config": asdict(model.config)},
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import datetime
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ LICENCES = {
     OWN: "your own",
 }
 RESEARCH = "research and non-commercial use: the training data is licensed so"
+FREE = f"{OPEN}: trained on CMU data alone"
 # What the recipe of the autoencoder trains, for the card; the others are there to be compared with.
 DESCRIPTIONS = {
     "cae": "Convolutional autoencoder for infilling (Kaufmann et al. 2020)",
@@ -59,30 +61,47 @@ class _Run:
 
     Attributes:
         folder: where it lies.
+        packs: what it learned from.
+        splits: the parts of them.
         settings: its own.
         log: after that of the weights that it started from.
         earlier: what their card said of their training.
         auto: what `auto` goes by. It stays as measured on the weights that the run started from: a run that
             goes on may train on the performers that it was measured with. Of a first run it is not measured
             yet, so that all gaps are the spline's until `interpose bench threshold --save`.
+        licence: what the weights that it started from may be used for; "" of a first run.
+        data: what these had learned from.
     """
 
     folder: Path
+    packs: list[Pack]
+    splits: list[str]
     settings: dict[str, Any]
     log: list[dict[str, Any]]
     earlier: list[dict[str, Any]]
     auto: dict[str, Any]
+    licence: str = ""
+    data: list[dict[str, Any]] = field(default_factory=list)
 
     @classmethod
-    def of(cls, folder: Path) -> _Run:
-        """Read it."""
+    def of(cls, folder: Path, packs: list[Pack], splits: Sequence[str]) -> _Run:
+        """Read it. `packs` are those that there are, `splits` those of a run that has none on record."""
 
         def lines(name: str) -> list[dict[str, Any]]:
             return [json.loads(line) for line in (folder / name).read_text().splitlines()]
 
         settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+        packs = chosen(packs, ",".join(settings.pop("packs", [])))
+        kept_splits = settings.pop("splits", None)
+        if kept_splits and splits and {*kept_splits} != {*splits}:
+            raise RequestError(
+                f"{folder} was not trained on {','.join(splits)}",
+                f"it has {','.join(kept_splits)} on record",
+                "Leave out --splits.",
+            )
+        known = (folder, packs, kept_splits or list(splits) or ["train"], settings)
         if not (folder / "earlier.json").exists():
-            return cls(folder, settings, lines("log.jsonl"), [], {"from_gap": 61})
+            return cls(*known, lines("log.jsonl"), [], {"from_gap": 61})
         before = lines("earlier.jsonl")
         steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
         after = [
@@ -90,7 +109,11 @@ class _Run:
             for entry in lines("log.jsonl")
         ]
         kept = json.loads((folder / "earlier.json").read_text())
-        return cls(folder, settings, before + after, kept["training"], kept["auto"])
+        # Older runs did not keep the licence. Their history tells all data sets that were ever asked for: if
+        # that is CMU each time, as `small-open` was trained, nothing else can be in it.
+        alone = all(one.get("datasets") == "cmu" for one in kept["training"])
+        licence = kept.get("licence") or (FREE if alone else RESEARCH)
+        return cls(*known, before + after, kept["training"], kept["auto"], licence, kept.get("data", []))
 
     def begin(self, out: Path, name: str, model: torch.nn.Module) -> Path:
         """Fill a model with the averaged weights, write the log, and say where the graph `name` goes.
@@ -107,13 +130,21 @@ class _Run:
         (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in self.log))
         return out / f"{name}.onnx"
 
-    def training(self, recipe: str, splits: list[str], model: torch.nn.Module) -> dict[str, Any]:
+    def terms(self, mean: Card | None = None) -> dict[str, Any]:
+        """Licence and data for the card: of the packs, of the weights that it started from, and of `mean`."""
+        others = [one for one in (self.licence, mean.licence if mean else "") if one]
+        return {
+            "licence": narrowest([*others, _licence(self.packs)]),
+            "data": _joined([*self.data, *(mean.data if mean else []), *_data(self.packs, self.splits)]),
+        }
+
+    def training(self, recipe: str, model: torch.nn.Module) -> dict[str, Any]:
         """How the weights came to be, for the card."""
         return {
             "recipe": f"interpose train {recipe}"
             + (", going on from what `earlier` tells of" if self.earlier else ""),
             **self.settings,
-            "splits": splits,
+            "splits": self.splits,
             "steps": self.log[-1]["step"],
             "device_hours": self.log[-1]["hours"],  # from the first start on, as the steps
             "earlier": self.earlier,
@@ -122,24 +153,24 @@ class _Run:
         }
 
 
-def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_cae(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `cae.onnx`, `cae.json`, the training log and its curve into `out` from a run's folder.
 
     A run of one of the networks to compare with is called after that network instead.
     """
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     name = settings.get("network", "cae")
     model = NETWORKS[name]()
     export_cae_onnx(model, run.begin(out, name, model))
     _curves(log, name, f"{settings.get('loss', 'l1').upper()}, normalised", (15, 30, 60), out)
-    longest = settings.get("gap") or 60
+    drawn = min(settings.get("last_gap", 60), settings.get("length", 120) - 2)
+    longest = settings.get("gap") or round(drawn)
     card = Card(
         name=name,
         method="cae",
         description=f"{DESCRIPTIONS[name]}, trained on gaps to {longest / 30:g} s",
-        licence=_licence(packs),
-        data=_data(packs, splits),
+        **run.terms(),
         tasks=["fill", "recover"],
         joints=list(JOINTS),
         fps=30.0,
@@ -147,7 +178,7 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
         # validation performers, whom its last runs had seen, are off by 22, not 39 cm (bench context).
         max_gap=2 * longest,
         training={
-            **run.training("cae", splits, model),
+            **run.training("cae", model),
             "statistics": {
                 "mean": [round(float(v), 6) for v in model.mean.flatten()],
                 "std": [round(float(v), 6) for v in model.std.flatten()],
@@ -160,9 +191,10 @@ def export_cae(folder: Path, packs: list[Pack], out: Path, splits: list[str]) ->
     return card
 
 
-def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `seq2seq.onnx`, `seq2seq.json`, the log and its curves into `out` from a run's folder."""
-    run = _Run.of(folder)
+    packs = [pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS]
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = settings.pop("config")
     model = Seq2Seq(Seq2SeqConfig(**{**config, "labels": tuple(config["labels"])}))
@@ -180,13 +212,12 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
         name="seq2seq",
         method="seq2seq",
         description="Residual sequence-to-sequence network (Martinez et al. 2017), to compare forecasts with",
-        licence=_licence(packs),
-        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms(),
         tasks=[],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=0,
-        training=run.training("seq2seq", splits, model),
+        training=run.training("seq2seq", model),
         metrics={"validation": log[-1]},
         labels=config["labels"],
     )
@@ -194,9 +225,9 @@ def export_seq2seq(folder: Path, packs: list[Pack], out: Path, splits: list[str]
     return card
 
 
-def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `cmib.onnx`, `cmib.json`, the training log and its curves into `out` from a run's folder."""
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = settings.pop("config")
     model = Cmib(CmibConfig(**{**config, "labels": tuple(config["labels"])}))
@@ -207,26 +238,26 @@ def export_cmib(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -
         name="cmib",
         method="cmib",
         description="Conditional motion in-betweening (Kim et al. 2022) between keys, with action labels",
-        licence=_licence(packs),
-        data=_data(packs, splits),
+        **run.terms(),
         tasks=["fill", "between"],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=settings["longest"] - 2,  # a length counts both keys
-        training={**run.training("cmib", splits, model), "config": config},
+        training={**run.training("cmib", model), "config": config},
         metrics={"validation": log[-1]},
         labels=labels,
-        paces=paces(packs, splits),
+        paces=paces(run.packs, run.splits),
     )
     card.save(out / "cmib.json")
     return card
 
 
-def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str]) -> Card:
+def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: Sequence[str] = ()) -> Card:
     """Write `stmi-gan.onnx`, `stmi-gan.json`, the log and its curves into `out` from a run's folder, and the
     discriminator, against which a run that starts from these weights goes on. Those of `config=dense` are
     called stmi-gan-dense."""
-    run = _Run.of(folder)
+    packs = [pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS]
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     config = StmiGanConfig.of(settings["network"])
     model, name = Generator(config), "stmi-gan-dense" if settings["config"] == "dense" else "stmi-gan"
@@ -247,14 +278,13 @@ def export_stmi_gan(folder: Path, packs: list[Pack], out: Path, splits: list[str
         name=name,
         method="stmi-gan",
         description="Spatio-temporal inpainting GAN (Hernandez Ruiz et al. 2019): forecasts, lost joints",
-        licence=_licence(packs),
-        data=_data([pack for pack in packs if str(pack.dataset) in STMI_GAN_DATASETS], splits),
+        **run.terms(),
         # In the paper there are no gaps between poses, nor in its configuration.
         tasks=["forecast", "recover", *(["fill"] if settings["config"] == "dense" else [])],
         joints=list(JOINTS),
         fps=config.fps,
         max_gap=config.frames // 2,
-        training=run.training("stmi-gan", splits, model),
+        training=run.training("stmi-gan", model),
         metrics={"validation": log[-1]},
     )
     card.save(out / f"{name}.json")
@@ -265,23 +295,22 @@ def export_base(
     folder: Path,
     packs: list[Pack],
     out: Path,
-    splits: list[str],
-    licence: str | None = None,
+    splits: Sequence[str] = (),
     mean: Card | None = None,
-    before: Card | None = None,
 ) -> Card:
     """Write the graph, `small.onnx` or what else it is called, its card, the log and its curves into `out`.
 
-    licence: what the weights may be used for, where the packs do not decide.
     mean: weights of the same network that the run started from, whose mean with the run's is written
         (Wortsman et al. 2022): what the run learned at the cost of something else, it keeps half of. They are
         measured anew, on the packs' validation performers.
-    before: weights that the run started from and whose data is not among the packs: the card names it, too.
     """
-    run = _Run.of(folder)
+    run = _Run.of(folder, packs, splits)
     settings, log = run.settings, run.log
     network = settings.pop("network")
-    name, labels = title(settings["config"], settings["datasets"]), network["labels"]
+    run.packs = chosen(run.packs, settings["datasets"])  # for runs that have none on record
+    terms = run.terms(mean)
+    name = title(settings["config"], settings["datasets"], terms["licence"].startswith(OPEN))
+    labels = network["labels"]
     model = Base(BaseConfig(**{**network, "labels": tuple(labels)}))
     path, measured = run.begin(out, name, model), log[-1]
     if mean:
@@ -290,18 +319,16 @@ def export_base(
     export_base_onnx(model, path)
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
-    packs = chosen(packs, settings["datasets"])
     card = Card(
         name=name,
         method=name if name in METHODS else "small",  # which runs networks of that kind, of any size
         description="interpose's own network: whatever is missing of a motion",
-        licence=licence or _licence(packs),
-        data=[*(before.data if before else []), *_data(packs, splits)],
+        **terms,
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
         fps=30.0,
         max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
-        training={**run.training("base", splits, model), "network": network},
+        training={**run.training("base", model), "network": network},
         metrics={"validation": measured},
         auto=run.auto,
         labels=labels,
@@ -336,8 +363,31 @@ def paces(packs: list[Pack], splits: list[str]) -> dict[str, list[float]]:
     }
 
 
+def narrowest(licences: list[str]) -> str:
+    """What may be done with what has all of these licences: research alone if one says so, and all of what
+    they add after a semicolon."""
+    uses, more = zip(*(one.partition("; ")[::2] for one in licences))
+    narrow = [use for use in uses if not use.startswith(OPEN)] or uses[:1]
+    return "; ".join(dict.fromkeys([*narrow, *filter(None, more)]))
+
+
 def _licence(packs: list[Pack]) -> str:
-    return f"{OPEN}: trained on CMU data alone" if {pack.dataset for pack in packs} == {"cmu"} else RESEARCH
+    """What may be done with weights that learned from the packs alone."""
+    names = {str(pack.dataset) for pack in packs}
+    if names == {OWN}:
+        return f"{OPEN}; and what your own clips allow"
+    return FREE if names == {"cmu"} else RESEARCH
+
+
+def _joined(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Data of one run after the other: of a set the most that one of them saw. A user's own clips are a set
+    each time that they are others."""
+    kept: dict[Any, dict[str, Any]] = {}
+    for one in data:
+        key = (OWN, one["clips"], one["frames"]) if one["name"] == OWN else one["name"]
+        kept[key] = max(kept.get(key, one), one, key=lambda some: some["frames"])
+    order = [*DATASETS, OWN]
+    return sorted(kept.values(), key=lambda one: order.index(one["name"]))
 
 
 def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
@@ -348,7 +398,7 @@ def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
         frames = int(np.diff(pack.starts)[kept].sum())
         name = str(pack.dataset)
         data.append({"name": name, "licence": LICENCES[name], "clips": int(kept.sum()), "frames": frames})
-    return sorted(data, key=lambda one: [*DATASETS, OWN].index(one["name"]))
+    return data
 
 
 def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ...], out: Path) -> None:

@@ -11,22 +11,26 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 from torch import distributed as dist
 
+from interpose.datasets import Pack
 from interpose.errors import FileError, RequestError
 from interpose.methods.weights import Card
 from interpose.training.budget import Budget
 from interpose.training.device import processes, rank
 from interpose.training.optimizers import Muon
+
+SHARE, SWITCH = (0, 1), (0, 1)
+SOME = (1, math.inf)  # of what is counted
 
 
 @dataclass
@@ -36,6 +40,14 @@ class Settings:
     The learning rate warms up over the first hundredth of the budget and falls to zero along half a
     cosine over the rest of it; weights are averaged exponentially.
     """
+
+    # The least and the most of settings that are numbers: 0 and anything finite where it is not said.
+    LIMITS: ClassVar[dict[str, tuple[float, float]]] = {
+        "learning_rate": (1e-12, 10),
+        "average": SHARE,
+        "seed": (0, 2**32 - 1),
+        "batch": SOME,
+    }
 
     learning_rate: float = 1e-3
     warm_up: float = 0.01
@@ -48,6 +60,22 @@ class Settings:
         if not 0 < self.warm_up <= 1:
             raise RequestError(
                 f"cannot warm up over {self.warm_up:g} of the budget", "it is a share", "Choose 0.001 to 1."
+            )
+        for one in fields(self):
+            value, (low, high) = getattr(self, one.name), self.LIMITS.get(one.name, (0, math.inf))
+            if isinstance(value, int | float) and not (low <= value <= high and math.isfinite(value)):
+                most = f" to {high:g}" if math.isfinite(high) else " on, and finite"
+                raise RequestError(
+                    f"cannot train with {one.name}={value}",
+                    f"it is a number from {low:g}{most}",
+                    f"Write --set {one.name}={one.default}, as in the recipe, or another one in that range.",
+                )
+        shortest, longest = (getattr(self, name, 0) for name in ("shortest", "longest"))
+        if shortest > longest:
+            raise RequestError(
+                f"cannot train with shortest={shortest}",
+                f"it is more than longest={longest}",
+                "Choose a smaller --set shortest, or a larger --set longest.",
             )
 
 
@@ -151,6 +179,51 @@ def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in names}
 
 
+def _listed(values: dict[str, Any]) -> str:
+    """name=value, as options say it."""
+    texts = {name: ",".join(map(str, v)) if isinstance(v, list) else v for name, v in values.items()}
+    return ", ".join(f"{name}={text}" for name, text in texts.items())
+
+
+def _write(path: Path, text: str) -> None:
+    """Whole or not at all: other processes of the run read it."""
+    new = path.with_name(path.name + ".new")
+    new.write_text(text)
+    os.replace(new, path)
+
+
+def taught(packs: Sequence[Pack], splits: Sequence[str]) -> dict[str, Any]:
+    """What a run learns from, for its record."""
+    return {"packs": sorted(str(pack.dataset) for pack in packs), "splits": sorted({*splits})}
+
+
+def recorded(folder: Path, network: str = "") -> dict[str, Any] | None:
+    """What is on record of the run that goes on in a folder, under the name `network` what its network is, if
+    that is asked for; None where none has begun."""
+    path = folder / "checkpoint.pt"
+    if not path.exists():
+        return None
+    try:
+        kept: dict[str, Any] = json.loads((folder / "settings.json").read_text())
+        return kept[network] if network else kept
+    except (OSError, ValueError, KeyError):
+        raise FileError(
+            f"cannot go on from {path}",
+            "settings.json beside it, which says of what it is, is missing or damaged",
+            "Delete it or name another folder.",
+        ) from None
+
+
+def from_weights(folder: Path, start: Card | None) -> bool:
+    """Whether a run starts from weights, or goes on and did so; then `start` need not be named again."""
+    return bool(start) or (recorded(folder) is not None and (folder / "earlier.json").exists())
+
+
+def _history(start: Card) -> list[dict[str, Any]]:
+    """How weights came to be, from the first run on."""
+    return [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
+
+
 class Trainer:
     """Runs one recipe in one folder: `checkpoint.pt`, `averaged.pt` and `log.jsonl` are in there.
 
@@ -165,6 +238,7 @@ class Trainer:
         clip: the largest norm of the gradients.
         about: what else the card should say of the model; kept with the settings.
         opponent: a network that the model plays against, for adversarial training.
+        data: what it learns from, as `taught` says.
     """
 
     def __init__(
@@ -180,6 +254,7 @@ class Trainer:
         clip: float | None = None,
         about: dict[str, Any] | None = None,
         opponent: Opponent | None = None,
+        data: dict[str, Any] | None = None,
     ) -> None:
         self.model, self.loss, self.validate = model, loss, validate
         self.folder, self.budget, self.settings, self.say = folder, budget, settings, say
@@ -188,7 +263,7 @@ class Trainer:
             lambda some: torch.optim.Adam(some, settings.learning_rate)
         )
         self.optimizer, self.clip, self.about = make(list(model.parameters())), clip, about or {}
-        self.opponent = opponent
+        self.opponent, self.data = opponent, data or {}
         self.board: Any = None  # TensorBoard's, where it is installed
         self.averaged = copy.deepcopy(model).eval().requires_grad_(False)
         # Every process draws batches of its own.
@@ -196,10 +271,14 @@ class Trainer:
         folder.mkdir(parents=True, exist_ok=True)
 
     def resume(self) -> bool:
-        """Go on where an interrupted run stopped, when the folder holds one."""
-        path = self.folder / "checkpoint.pt"
-        if not path.exists():
+        """Go on where an interrupted run stopped, when the folder holds one.
+
+        RequestError where it would go on with another recipe: the card tells of one.
+        """
+        path, kept = self.folder / "checkpoint.pt", recorded(self.folder)
+        if kept is None:
             return False
+        self._stay(kept)
         try:
             state = torch.load(path, map_location=self.device, weights_only=False)
             self.model.load_state_dict(state["model"])
@@ -216,12 +295,45 @@ class Trainer:
         self.budget.spent_seconds, self.budget.spent_steps = state["seconds"], state["steps"]
         return True
 
+    def _stay(self, kept: dict[str, Any]) -> None:
+        """Compare with what is on record; older runs have less of it there."""
+        recipe = _without(asdict(self.settings), "every_seconds")
+        asked = json.loads(json.dumps({**recipe, **self.data}))
+        others = {name: value for name, value in asked.items() if kept.get(name, value) != value}
+        if others:
+            raise RequestError(
+                f"the run in {self.folder} cannot go on with {_listed(others)}",
+                f"it began with {_listed({name: kept[name] for name in others})}",
+                "Repeat that (--set, --splits, --packs), or name another --out.",
+            )
+        # What the first part of such a run learned from is not known.
+        self.data = {name: value for name, value in self.data.items() if name in kept}
+
+    def _begin(self, start: Card | None) -> None:
+        """Keep where the run starts, unless it goes on. RequestError where it started elsewhere."""
+        path = self.folder / "earlier.json"
+        if recorded(self.folder) is None:
+            if rank() == 0 and not start:
+                path.unlink(missing_ok=True)  # of a run that never came to save anything
+        elif start and not (path.exists() and json.loads(path.read_text())["training"] == _history(start)):
+            raise RequestError(
+                f"the run in {self.folder} cannot go on from {start.name}",
+                f"it began with {'other weights' if path.exists() else 'none'}",
+                "Name another --out, or leave out --start where it was given.",
+            )
+        if start:
+            self.follow(start)
+
     def follow(self, start: Card) -> None:
         """Keep the history of the weights that the run starts from, for the card of what comes out."""
         if rank() == 0:
-            history = [*start.training.get("earlier", []), _without(start.training, "earlier", "statistics")]
-            kept = {"training": history, "auto": start.auto}
-            (self.folder / "earlier.json").write_text(json.dumps(kept, indent=2) + "\n")
+            kept = {
+                "training": _history(start),
+                "auto": start.auto,
+                "licence": start.licence,
+                "data": start.data,
+            }
+            _write(self.folder / "earlier.json", json.dumps(kept, indent=2) + "\n")
             log = start.path.with_name("log.jsonl")
             (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
 
@@ -232,8 +344,8 @@ class Trainer:
             what: in words.
             start: the weights that the model was filled with, if any.
         """
+        self._begin(start)
         if start:
-            self.follow(start)
             # Else weights that were trained with the same seed would learn from the same batches once more.
             self.rng = np.random.default_rng([self.settings.seed, rank(), start.training.get("steps", 0)])
         self.say(what)
@@ -279,16 +391,18 @@ class Trainer:
         Asked to stop, by Ctrl-C or a signal to terminate, it ends the step and saves; then the signal does
         what it does without a run: KeyboardInterrupt, or the end of the process.
         """
-        if rank() == 0:
+        # Where nothing is left to do, what was done stays on record.
+        if rank() == 0 and self.budget.fraction < 1:
             kept = {
                 **asdict(self.settings),
                 **self.about,
+                **self.data,
                 "budget": str(self.budget),
                 "processes": processes(),
                 "device": torch.cuda.get_device_name() if self.device.type == "cuda" else "CPU",
             }
             kept["commit"] = commit()
-            (self.folder / "settings.json").write_text(json.dumps(kept, indent=2) + "\n")
+            _write(self.folder / "settings.json", json.dumps(kept, indent=2) + "\n")
         # What is drawn on the device differs between processes, and is not drawn again by a run that goes on.
         own = np.random.SeedSequence([self.settings.seed, rank(), self.budget.spent_steps])
         torch.manual_seed(int(own.generate_state(1)[0]))

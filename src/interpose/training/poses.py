@@ -50,7 +50,8 @@ class Batch:
 def labels_of(packs: Sequence[Pack], splits: Sequence[str], before: Sequence[str] = ("",)) -> tuple[str, ...]:
     """All labels of the clips of some splits, sorted, after those of `before`.
 
-    "" is for motions without one; a run that starts from weights keeps theirs, in their order.
+    "" is for motions without one; a run that starts from weights keeps theirs, in their order. One that goes
+    on has as many as when it began: it asks its record, not this.
     """
     found = {str(x) for pack in packs for x, s in zip(pack.labels, pack.splits) if s in splits}
     return (*before, *sorted(found - {*before}))

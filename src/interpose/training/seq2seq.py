@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -22,7 +23,7 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig, from_values, to_val
 from interpose.skeletons import PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import pick_device, processes
-from interpose.training.loop import Settings, Trainer, restore
+from interpose.training.loop import SOME, Settings, Trainer, recorded, restore, taught
 from interpose.training.poses import Batch, Poses, labels_of
 from interpose.training.stmi_gan import DATASETS
 
@@ -32,6 +33,8 @@ ROLLED = 120  # frames that are foretold when it is measured, 4 s
 @dataclass
 class Seq2SeqSettings(Settings):
     """The paper's recipe, the optimiser apart."""
+
+    LIMITS: ClassVar = {**Settings.LIMITS, **dict.fromkeys(("seen", "foretold", "units"), SOME)}
 
     learning_rate: float = 5e-4
     batch: int = 16  # of all processes together
@@ -54,15 +57,16 @@ def train_seq2seq(
     device = pick_device()
     torch.manual_seed(settings.seed)
     packs = [pack for pack in packs if str(pack.dataset) in DATASETS]
-    labels = labels_of(packs, splits)
+    before = recorded(folder, "config")
+    labels = tuple(before["labels"]) if before else labels_of(packs, splits, start.labels if start else ("",))
     length = settings.seen + settings.foretold
     poses = Poses(packs, splits, labels, length, device)
     whole = settings.seen + ROLLED
     held_out = Poses(packs, ("validation",), labels, whole, device).spread(96, whole)
     model = Seq2Seq(Seq2SeqConfig(labels, settings.units)).to(device)
-    if start:
+    if start and not before:
         restore(model, start.onnx)
-    else:
+    elif not before:
         rng = np.random.default_rng(settings.seed)
         drawn = torch.cat([poses.draw(rng, 64, length).rotation.flatten(0, 1) for _ in range(20)])
         model.standardise(to_values(drawn))
@@ -84,6 +88,7 @@ def train_seq2seq(
         say,
         clip=5.0,
         about={"config": asdict(model.config)},
+        data=taught(packs, splits),
     )
     return trainer.go(
         f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start

@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
@@ -48,7 +49,7 @@ from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
 from interpose.training.device import pick_device, processes, send
-from interpose.training.loop import Opponent, Settings, Trainer, restore
+from interpose.training.loop import SHARE, SOME, Opponent, Settings, Trainer, restore, taught
 from interpose.training.windows import Windows
 
 DATASETS = ("lafan1", "bandai")
@@ -62,6 +63,13 @@ BONE_PAIRS = Constant([ENDS.index((parent, joint)) for joint, parent in enumerat
 @dataclass
 class StmiGanSettings(Settings):
     """The paper's recipe, its step-wise learning rate apart: here it follows the budget."""
+
+    LIMITS: ClassVar = {
+        **Settings.LIMITS,
+        "forecasts": SHARE,
+        "every": SOME,
+        "tallest": (1, 1.9),  # the smallest are as much smaller
+    }
 
     config: str = "dense"  # one of CONFIGS
     branches: str = ",".join(BRANCHES)  # of the discriminator; none for NoGAN, which is told the whole truth
@@ -331,6 +339,7 @@ def train_stmi_gan(
         say,
         optimizer=optimizer,
         about={"network": asdict(settings.network)},
+        data=taught(packs, splits),
         opponent=opponent if settings.looks else None,
     )
     return trainer.go(
