@@ -7,7 +7,7 @@ from typing import Any
 from interpose.cli.console import say, say_json, say_table
 
 METHODS = {
-    "auto": "what measured best: base, for gaps of a tenth of a second and less small or the spline",
+    "auto": "what measured best: base, for gaps of a tenth of a second and less the spline",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "kalman": "low-rank Kalman smoothing: joints that move together tell where a lost limb is",
