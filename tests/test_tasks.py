@@ -558,6 +558,48 @@ def test_a_network_says_of_every_new_frame_which_feet_stand(cmu_walk, fps):
     assert np.abs(fine[:step] - coarse[0]).max() < 0.35, "nothing is mixed with what was never said"
 
 
+def test_a_method_that_fails_when_it_is_asked_is_named(cmu_walk):
+    class Odd(type(registry.get("linear"))):  # type: ignore[misc]
+        name = "odd"
+
+        def refuses(self, clip, gap):  # type: ignore[no-untyped-def]
+            return clip.nothing
+
+    with pytest.raises(RequestError, match="the method odd does not work"):
+        complete(cmu_walk, Observation.from_gaps(cmu_walk, [Gap(70, 100)]), Odd())
+
+
+@pytest.mark.parametrize(
+    "joints", [range(1, 32), range(-1, 30), [*range(30), 5.5], [*range(30), "Head"], None]
+)
+def test_a_method_that_speaks_of_joints_that_are_not_there_is_named(cmu_walk, joints):
+    class Odd(type(registry.get("linear"))):  # type: ignore[misc]
+        name = "odd"
+
+        def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+            raw = super().complete(clip, observation, seed)
+            return replace(raw, positions=raw.clip.positions(), joints=joints)
+
+    assert len(cmu_walk.skeleton) == 31
+    with pytest.raises(RequestError, match="the method odd does not work"):
+        complete(cmu_walk, Observation.from_gaps(cmu_walk, [Gap(70, 100)]), Odd())
+
+
+def test_a_method_that_answers_on_other_bones_is_named(cmu_walk):
+    class Odd(type(registry.get("linear"))):  # type: ignore[misc]
+        name = "odd"
+
+        def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+            raw = super().complete(clip, observation, seed)
+            longer = replace(clip.skeleton, rest_translation=2 * clip.skeleton.rest_translation)
+            return replace(raw, clip=replace(raw.clip, skeleton=longer))
+
+    with pytest.raises(
+        RequestError, match="the method odd does not work\nit gave a clip on another skeleton"
+    ):
+        complete(cmu_walk, Observation.from_gaps(cmu_walk, [Gap(70, 100)]), Odd())
+
+
 @pytest.mark.parametrize(
     "wrong", [{"stands": np.ones((7, 4))}, {"expected": np.ones(7)}, {"translated": (0, 1)}]
 )

@@ -44,13 +44,35 @@ def test_unknown_names_list_the_known_ones():
     assert "Did you mean spline" in error.value.fix
 
 
+class Other(classical.Linear):
+    name = "other"
+
+
+class Mute:
+    """A method that misses a part."""
+
+    name = "mute"
+    complete = classical.Linear.complete
+
+
 def test_methods_of_other_packages(offer):
-    offer(other="interpose.methods.classical:Linear", linear="nowhere:Bad", broken="nowhere:Bad")
+    offer(other=f"{__name__}:Other", linear="nowhere:Bad", broken="nowhere:Bad")
     assert registry.names()[-2:] == ("broken", "other")
-    assert isinstance(registry.get("other"), classical.Linear)
+    assert isinstance(registry.get("other"), Other)
     assert isinstance(registry.get("linear"), classical.Linear)
     with pytest.raises(RequestError, match="broken cannot be loaded"):
         registry.get("broken")
+
+
+def test_methods_of_other_packages_that_are_none_say_what_they_lack(offer):
+    offer(mute=f"{__name__}:Mute", alias=f"{__name__}:Other")
+    with pytest.raises(RequestError, match="mute cannot be loaded") as error:
+        registry.get("mute")
+    assert "has no refuses" in error.value.why
+    with pytest.raises(RequestError, match="alias cannot be loaded") as error:
+        registry.get("alias")  # its report would name another method, which nobody could repeat
+    assert "its name is other" in error.value.why
+    assert len(str(error.value).splitlines()) == 3
 
 
 def test_listing_methods_loads_no_network():

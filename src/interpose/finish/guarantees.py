@@ -13,7 +13,7 @@ from interpose.clip import Clip
 from interpose.finish import anatomy, feet, floor, jumps, notes, pins, seams
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
-from interpose.finish.opinion import as_rotations, carried, certain, merge, said, second
+from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
 from interpose.finish.report import Completion, Report
 from interpose.finish.span import Span, write
 from interpose.finish.standing import alone
@@ -94,7 +94,7 @@ class _Work:
         """Let the method speak, and start from what it says."""
         ask, hidden, known = self.ask, self.hidden, self.known
         for gap in self.gaps:
-            if reason := ask.method.refuses(hidden, gap):
+            if reason := refusal(ask.method, hidden, gap):
                 there = replace(gap, start=gap.start + ask.first, stop=gap.stop + ask.first)
                 self._of(gap).problem = f"{ask.method.name} refuses {there}: {reason}"
         if all(span.problem for span in self.spans):

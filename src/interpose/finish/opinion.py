@@ -3,12 +3,14 @@ what it gives is checked, positions are solved for rotations, and what is observ
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.errors import InterposeError, RequestError
 from interpose.finish import seams
 from interpose.finish.solve import solve, solve_error
@@ -23,6 +25,8 @@ from interpose.observation import Gap, Observation
 
 # Positions further out than this (metres) are as good as no numbers.
 NOWHERE = 1e4
+# Rests of joints that differ by less (metres, parts of a quaternion) are the same, rounded.
+SAME = 1e-4
 # Frames solved at once.
 CHUNK = 4096
 
@@ -53,8 +57,24 @@ def said(method: Method, clip: Clip, observation: Observation, seed: int | None)
     seen = replace(
         observation, rotation=observation.rotation.copy(), translation=observation.translation.copy()
     )
-    try:
+    with _blamed(method):
         raw = method.complete(own, seen, seed)
+        _sound(raw, clip, method.name)
+    return raw
+
+
+def refusal(method: Method, clip: Clip, gap: Gap) -> str | None:
+    """Why a method cannot fill a gap, or None if it can."""
+    with _blamed(method):
+        reason = method.refuses(clip, gap)
+    return reason
+
+
+@contextmanager
+def _blamed(method: Method) -> Iterator[None]:
+    """What goes wrong within is the fault of a method: RequestError names it."""
+    try:
+        yield
     except InterposeError:
         raise
     except Exception as error:
@@ -62,8 +82,6 @@ def said(method: Method, clip: Clip, observation: Observation, seed: int | None)
         raise RequestError(
             f"the method {method.name} does not work", why, "Tell those who made it."
         ) from error
-    _sound(raw, clip, method.name)
-    return raw
 
 
 def second(
@@ -84,6 +102,10 @@ def _sound(raw: Any, clip: Clip, name: str) -> None:
         problem = f"it gave {raw.clip.rotation.shape[:2]} frames and joints of {clip.rotation.shape[:2]}"
     elif raw.positions is not None and np.shape(raw.positions) != (len(clip), len(raw.joints), 3):
         problem = f"it gave positions {np.shape(raw.positions)} of {len(raw.joints)} joints"
+    elif raw.positions is not None and (odd := _strange(raw.joints, len(clip.skeleton))):
+        problem = f"it gave positions of joint {odd[0]}, and joints are 0 to {len(clip.skeleton) - 1}"
+    elif not _alike(raw.clip.skeleton, clip.skeleton):
+        problem = "it gave a clip on another skeleton"
     elif raw.clip.translated != clip.translated:
         problem = "it gave a clip in which other joints are translated"
     elif raw.stands is not None and np.shape(raw.stands) != (len(clip), 4):
@@ -93,6 +115,20 @@ def _sound(raw: Any, clip: Clip, name: str) -> None:
     else:
         return
     raise RequestError(f"the method {name} does not work", problem, "Tell those who made it.")
+
+
+def _strange(joints: Iterable[object], count: int) -> list[object]:
+    """Those that are no indices of `count` joints."""
+    return [joint for joint in joints if not (isinstance(joint, int | np.integer) and 0 <= joint < count)]
+
+
+def _alike(one: Skeleton, other: Skeleton) -> bool:
+    """Whether rotations and positions mean the same on two skeletons."""
+    rests = ("rest_translation", "rest_rotation", "rest_scale")
+    return one is other or (
+        one.parents == other.parents
+        and all(np.allclose(getattr(one, rest), getattr(other, rest), atol=SAME) for rest in rests)
+    )
 
 
 def as_rotations(raw: Raw, known: Observation, spans: list[Span]) -> tuple[Clip, np.ndarray | None]:

@@ -71,14 +71,21 @@ def _named(name: str) -> Method:
         module, kind = METHODS[name]
         return getattr(import_module(module), kind)()
     entry = _offered()[name]
+    what, fix = (
+        f"the method {name} cannot be loaded",
+        "Repair or remove that package, or choose another method.",
+    )
     try:
-        return entry.load()()
+        method = entry.load()()
     except Exception as error:
-        raise RequestError(
-            f"the method {name} cannot be loaded",
-            f"{entry.value} of another package fails with: {error}",
-            "Repair or remove that package, or choose another method.",
-        ) from error
+        raise RequestError(what, f"{entry.value} of another package fails with: {error}", fix) from error
+    if lacking := [part for part in ("name", "refuses", "complete") if not hasattr(method, part)]:
+        raise RequestError(what, f"{entry.value} of another package has no {' and no '.join(lacking)}", fix)
+    if method.name != name:
+        # A report names methods as they do themselves, and is repeated by the name of the entry point.
+        why = f"{entry.value} of another package says that its name is {method.name}"
+        raise RequestError(what, why, f"Call it {name} there, or {method.name} in the entry point.")
+    return method
 
 
 def told(name: str, action: str = "", temperature: float = 1.0) -> Method:

@@ -10,6 +10,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion
+from interpose.finish.opinion import refusal
 from interpose.methods import registry
 from interpose.methods.protocol import Sampler
 from interpose.observation import Gap, Observation, timeline
@@ -85,7 +86,7 @@ def forecast(
     gap = Gap(len(clip), len(longer))
     job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
     chosen = job.method.name if method == "auto" and job.method else method
-    if samples > 1 and job.method and (why := job.method.refuses(longer, gap)):
+    if samples > 1 and job.method and (why := refusal(job.method, longer, gap)):
         raise RequestError(
             f"cannot draw {samples} samples",
             f"{chosen} refuses: {why}",
