@@ -11,11 +11,12 @@ from interpose.methods.protocol import Method
 from interpose.observation import Gap
 
 # Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
-# keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.6 and
-# 7.4 cm with `small` in gaps of 15, 30 and 60 frames, 2.5, 4.8 and 10.4 with `cae` before it was trained on
-# these performers, 2.7, 6.6, 12.4 with the spline (bench threshold). Between two lone keys a second apart 5.5
-# with `small` and 5.7 with `cmib`, two seconds apart with one more in the middle 5.7 and 5.8. One joint, or
-# three, or a limb that is lost 4.6, 6.6 and 9.4 with `small`, 8.8, 13.9 and 16.5 with `cae` (bench every).
+# keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.7 and
+# 6.3 cm with `base` in gaps of 15, 30 and 60 frames, 1.8, 3.7 and 6.5 with `small`, 2.6, 4.6 and 6.7 with
+# `cae`, which has seen these performers, 3.4, 7.7 and 11.2 with the spline. Between two lone keys a second
+# apart 5.0 with `base` and `small`, 5.4 with `cmib`, two seconds apart with one more in the middle 5.2, 5.4
+# and 5.5. One joint, or three, or a limb that is lost 4.3, 6.5 and 9.2 with `base`, 8.9, 14.0 and 16.7 with
+# `cae` (bench every).
 # `small-open` stands in where only weights for any use are installed, or asked for.
 NETWORKS, KEYS = ("base", "small", "cae", "small-open"), ("base", "small", "cmib", "small-open")
 # At an end of a clip, where a spline has one side alone to go by, this one is ahead at any length: in 2 and 3
