@@ -126,6 +126,23 @@ def test_what_does_not_fit_is_said(cmu_walk):
         (lambda: interpose.forecast(cmu_walk, "30"), "whole number"),
         (lambda: interpose.between(cmu_walk, [0, 30.5, 75]), "no frame 30.5"),
         (lambda: interpose.fill(cmu_walk, (20, 60), seed=-1), "seed -1"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), seed="a"), "seed a"),
+        (lambda: interpose.forecast(cmu_walk, 10, seed="a", samples=2), "seed a"),
+        (lambda: interpose.denoise(cmu_walk, seed="a"), "seed a"),
+        (lambda: interpose.forecast(cmu_walk, 10, temperature="a"), "temperature a"),
+        (lambda: interpose.forecast(cmu_walk, 10, temperature=np.nan), "temperature nan"),
+        (lambda: interpose.denoise(cmu_walk, "a"), "strength a"),
+        (lambda: interpose.denoise(cmu_walk, None), "strength None"),
+        (lambda: interpose.fill(cmu_walk, [(20, 30), (60, 90)], only=3), "no gap number 3"),
+        (lambda: interpose.fill(cmu_walk, [(20, 30), (60, 90)], only=["a"]), "no gap number a"),
+        (lambda: interpose.fill(cmu_walk, [(20, 30), (60, 90)], only=[1.5]), "no gap number 1.5"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), max_gap=-1), "-1 as the length"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), max_gap=0), "0 as the length"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), max_gap="2x"), "2x as the length"),
+        (lambda: interpose.fill(cmu_walk, (20, 60), max_gap=[30]), "as the length"),
+        (lambda: interpose.resample(cmu_walk, "30"), "frame rate is wrong"),
+        (lambda: interpose.between(cmu_walk, 20), "nothing between the keys"),
+        (lambda: interpose.fill(cmu_walk, np.array([[20, 30, 40]])), "cannot read the gap"),
     ):
         with pytest.raises(interpose.RequestError, match=said):
             request()
@@ -146,6 +163,26 @@ def test_numbers_of_any_kind_say_frames(cmu_walk):
     stitched = interpose.stitch([cmu_walk, cmu_walk], np.int64(10), method="spline")
     assert len(stitched.clip) == 2 * len(cmu_walk) + 10
     assert interpose.stitch(cmu_walk, 10, loop=True, method="spline").report.gaps
+    forecast = interpose.forecast(cmu_walk, np.int64(10), method="linear", seed=np.int64(1))
+    assert len(forecast.clip) == len(cmu_walk) + 10
+
+
+def test_rows_of_an_array_are_gaps(cmu_walk):
+    for rows in ([[20, 30], [60, 90]], [[20, 30]]):
+        done = interpose.fill(cmu_walk, np.array(rows), method="linear")
+        assert [[gap.start, gap.stop] for gap in done.report.gaps] == rows
+
+
+@pytest.mark.parametrize("max_gap", [30, "30", "1s", np.int64(59), 59.0])
+def test_the_longest_gap_is_said_in_frames_or_seconds(cmu_walk, max_gap):
+    done = interpose.fill(cmu_walk, ["20:30", "100:160"], method="linear", max_gap=max_gap)
+    assert done.report.open == [interpose.Gap(100, 160)]
+
+
+@pytest.mark.parametrize("only", [2, [2], np.int64(2), np.array([2]), 2.0])
+def test_one_or_several_of_the_gaps_are_chosen(cmu_walk, only):
+    done = interpose.fill(cmu_walk, ["20:30", "100:160"], method="linear", only=only)
+    assert done.report.open == [interpose.Gap(20, 30)]
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any, SupportsInt, TypeAlias
+from numbers import Real
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -116,8 +117,8 @@ def fill(
     gaps: AnyGap | Sequence[AnyGap] | Observation | None = None,
     *,
     method: str = "auto",
-    max_gap: int | None = None,
-    only: Sequence[int] | None = None,
+    max_gap: int | str | None = None,
+    only: Iterable[int] | int | None = None,
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     parts: Part | Sequence[Part] = (),
@@ -129,11 +130,12 @@ def fill(
     Args:
         clip: a clip, or the path of one. Its values inside the gaps have no influence.
         gaps: one or several, each a Gap, "120:160" for frames 120 to 159, "4s:5.3s", "120:" to the end,
-            (120, 160) or (120, 160, ["LeftArm"]). An Observation says for every value whether it is known.
-            None: what a scan of the clip finds.
+            (120, 160) or (120, 160, ["LeftArm"]), or a row of an array (n, 2). An Observation says for
+            every value whether it is known. None: what a scan of the clip finds.
         method: one of `method_names()`, or "auto" for what measured best at each gap's length.
-        max_gap: frames; longer gaps stay open.
-        only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
+        max_gap: frames, or seconds as in "2s"; longer gaps stay open.
+        only: numbers of the gaps to fill, one or several, counted from 1 in order of time; the others stay
+            open.
         seed: for methods that sample.
         progress: called with the share done, 0 to 1.
         parts: poses of single joints that other clips give inside of the gaps.
@@ -424,13 +426,14 @@ def _clip(clip: Clip | str | Path) -> Clip:
 
 
 def _several(gaps: Any) -> list[Any]:
-    """The gaps of a list, or a list of the one that was given: a pair of numbers is one."""
+    """The gaps of a list, or a list of the one that was given: a pair of numbers is one.
+    Those of an array are its rows."""
     from interpose.observation import Gap
 
     if isinstance(gaps, Gap | str) or not isinstance(gaps, Iterable):
         return [gaps]
     gaps = list(gaps)
-    return [tuple(gaps)] if gaps and isinstance(gaps[0], SupportsInt) else gaps
+    return [tuple(gaps)] if gaps and isinstance(gaps[0], Real) else gaps
 
 
 def _range(frames: Any, clip: Clip) -> tuple[int, int] | None:

@@ -14,6 +14,7 @@ import numpy as np
 
 from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics
+from interpose.geometry.time import check_rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +127,9 @@ class Skeleton:
         return above
 
 
-# Frames a second: who has fewer gives a frame time for a rate, and nothing has more. How far the square of a
-# quaternion's length may be from 1: what is stored with three decimals is nearer, and is made 1 if it is not.
-SLOWEST, FASTEST, UNIT, ROUNDED = 0.25, 1e5, 0.01, 1e-6
+# How far the square of a quaternion's length may be from 1: what is stored with three decimals is nearer, and
+# is made 1 if it is not.
+UNIT, ROUNDED = 0.01, 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,12 +188,7 @@ class Clip:
                 f"expected ({frames}, {len(self.translated)}, 3), got {self.translation.shape}",
                 "There is one, in metres, for each joint in translated: the roots, if that is left out.",
             )
-        if not isinstance(self.fps, int | float | np.number) or not SLOWEST <= self.fps <= FASTEST:
-            raise RequestError(
-                "the frame rate is wrong",
-                f"it is a number of frames a second, {SLOWEST:g} to {FASTEST:g}, and got {self.fps!r}",
-                "Of a frame time give one over it.",
-            )
+        check_rate(self.fps)
         if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
             raise RequestError(
                 "the clip has values that are no numbers",

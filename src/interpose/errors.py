@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from numbers import Real
+from typing import Any, TypeGuard, cast
 
 
 class InterposeError(ValueError):
@@ -62,6 +65,17 @@ def unknown(kind: str, name: object, choices: object) -> RequestError:
         f"it is none of: {', '.join(names)}",
         f"{hint}Choose one of the names above.",
     )
+
+
+def is_number(
+    value: Any, least: float = -math.inf, most: float = math.inf, whole: bool = False
+) -> TypeGuard[float]:
+    """Whether something is a number of any kind, NumPy's too, from `least` to `most`: no text, no NaN, not
+    without end. A `whole` one may be written 2.0."""
+    if not isinstance(value, Real):
+        return False
+    size = cast(float, value)
+    return abs(size) < math.inf and least <= size <= most and (not whole or size == int(size))
 
 
 def few(names: Sequence[str], most: int = 4) -> str:

@@ -40,6 +40,14 @@ def test_exact(tmp_path):
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
 
 
+@pytest.mark.parametrize("name", ["a.npz", "a.bvh", "a.amc"])
+def test_clips_without_frames_are_not_written(tmp_path, name):
+    with pytest.raises(RequestError, match="the clip has no frames") as error:
+        formats.save(some_clip().slice(0, 0), tmp_path / name)
+    assert len(str(error.value).splitlines()) == 3
+    assert not list(tmp_path.iterdir())
+
+
 def test_bvh_to_npz_and_back(cmu_walk, tmp_path):
     formats.save(cmu_walk, tmp_path / "a.npz")
     formats.save(formats.load(tmp_path / "a.npz"), tmp_path / "b.bvh")

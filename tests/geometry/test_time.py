@@ -165,10 +165,12 @@ def test_resampling_tiny_clips(frames):
         assert (up.rotation[-1] == tiny.rotation[-1]).all()
 
 
-def test_resampling_to_nothing_is_refused():
-    for fps in (0, -30, float("nan")):
-        with pytest.raises(RequestError, match="above zero"):
-            time.resample(clip(), fps)
+@pytest.mark.parametrize("fps", [0, -30, 0.1, float("nan"), "30", None, 1e6, 1e9, 1e300])
+def test_rates_that_are_none_are_refused_before_anything_is_computed(fps, monkeypatch):
+    given = clip()
+    monkeypatch.setattr(time, "np", None)
+    with pytest.raises(RequestError, match="the frame rate is wrong"):
+        time.resample(given, fps)
 
 
 @pytest.mark.parametrize("smooth", [False, True])

@@ -99,7 +99,6 @@ def fill(
         check_method,
         from_options,
         layered,
-        length_of,
         part_of,
         parts_to_dict,
         path_of,
@@ -107,6 +106,7 @@ def fill(
         reading_of,
         roles_of,
     )
+    from interpose.observation.observation import longest
 
     if layer and from_ is None:
         raise RequestError(
@@ -137,7 +137,7 @@ def fill(
         request = replace(request, only=only_gap, why={})
     if seed is not None:
         request = replace(request, seed=seed)
-    most = None if max_gap is None else length_of(max_gap, clip)
+    most = None if max_gap is None else longest(max_gap, clip.fps)
     lines = [request.said] * bool(request.said)
     lines += [
         f"{one.file} is on another rig: its motion was retargeted" for one in request.parts if one.retargeted

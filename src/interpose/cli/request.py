@@ -244,18 +244,6 @@ def frame_of(text: str, clip: Clip) -> int:
     return frame
 
 
-def length_of(text: str, clip: Clip) -> int:
-    """Frames from "90", or from "3s". RequestError for what is none, or nothing."""
-    try:
-        frames = frame_at(text, clip.fps)
-    except ValueError:
-        frames = 0
-    if frames < 1:
-        why = "it is a number of frames, or of seconds, and more than none"
-        raise RequestError(f"cannot use --max-gap {text}", why, "Write --max-gap 90, or --max-gap 3s.")
-    return frames
-
-
 def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
     """Points "FRAME:A,B" of --path, in the file's own unit and floor axes: x and z in metres by frame."""
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")

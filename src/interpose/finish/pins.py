@@ -13,7 +13,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.finish import feet
 from interpose.finish.solve import BLOCK, refine, refine_steadily
 from interpose.geometry import rotations
@@ -48,7 +48,7 @@ def check(clip: Clip, observation: Observation) -> None:
                 "its frames must be a list of whole numbers, one or more",
                 f'Write Pin("{pin.joint}", [130], [[0.3, 1.4, 0.2]]).',
             )
-        if not pin.tolerance > 0:
+        if not (is_number(pin.tolerance) and pin.tolerance > 0):
             raise RequestError(
                 f"the pin of {pin.joint} does not fit",
                 f"its tolerance must be above zero, and is {pin.tolerance}",

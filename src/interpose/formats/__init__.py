@@ -109,8 +109,8 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         Notes on what the format cannot hold, and what else a file needs to be read; usually none.
 
     Raises:
-        RequestError: the suffix is unknown, the folder is missing, the file exists and `force` is False, or
-            the clip is none that the format can hold (.amc needs one read from .amc).
+        RequestError: the suffix is unknown, the folder is missing, the file exists and `force` is False,
+            the clip has no frames, or is none that the format can hold (.amc needs one read from .amc).
         FileError: the file cannot be written.
     """
     if not isinstance(clip, Clip):
@@ -118,6 +118,9 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
     path = Path(path)
     chosen = _format(path)
+    if not len(clip):
+        why = "the clip has no frames, and no file without any could be read again"
+        raise RequestError(f"cannot write {path}", why, "Give a clip of one frame or more.")
     _check_free(path, force)
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from array_api_compat import array_namespace
 
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.geometry import rotations
 
 if TYPE_CHECKING:
@@ -19,12 +19,24 @@ if TYPE_CHECKING:
 
 Array = Any
 
+# Frames a second: who has fewer gives a frame time for a rate, and nothing has more.
+SLOWEST, FASTEST = 0.25, 1e5
 # Steps in a run of known frames from which on they may be stretched.
 SPREAD = 5
 # Steps that two ends are apart at least.
 CLOSE = 0.6
 # Frames that are resampled at once.
 BLOCK = 4096
+
+
+def check_rate(fps: object) -> None:
+    """RequestError for what is no number of frames a second."""
+    if not is_number(fps, SLOWEST, FASTEST):
+        raise RequestError(
+            "the frame rate is wrong",
+            f"it is a number of frames a second, {SLOWEST:g} to {FASTEST:g}, and got {fps!r}",
+            "Of a frame time give one over it.",
+        )
 
 
 def runs(flags: np.ndarray) -> list[tuple[int, int]]:
@@ -204,10 +216,9 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     translations linearly, or both with continuous velocities (`smooth`). Frames that fall on old ones are
     those, unchanged. The file's layout is dropped: it belongs to the old frames.
 
-    Raises RequestError when `fps` is not above zero.
+    Raises RequestError when `fps` is no frame rate.
     """
-    if not (np.isfinite(fps) and fps > 0):
-        raise RequestError("cannot resample the clip", f"a frame rate must be above zero, got {fps}")
+    check_rate(fps)
     if not len(clip):
         return replace(clip, fps=fps, source=None)
     # Files round the frame time (0.033333 s): rates that are that close to a simple ratio mean it, or else

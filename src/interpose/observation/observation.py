@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 
 
 def frame_number(value: object) -> int:
     """A frame as a whole number, whatever kind of number says it; RequestError where it is none."""
-    if isinstance(value, int | float | np.number) and math.isfinite(value) and value == int(value):
+    if is_number(value, whole=True):
         return int(value)
     raise RequestError(
         f"there is no frame {str(value)[:40]}", "frames are whole numbers, counted from 0", "Write 120."
@@ -88,6 +88,21 @@ def frame_at(text: str, fps: float) -> int:
     if not math.isfinite(frame):
         raise ValueError
     return round(frame)
+
+
+def longest(max_gap: object, fps: float) -> int:
+    """How many frames a gap may have: of 90, "90" or "3s". RequestError for what is none, or nothing."""
+    try:
+        frames = frame_at(max_gap, fps) if isinstance(max_gap, str) else max_gap
+    except ValueError:
+        frames = None
+    if not is_number(frames, 1, whole=True):
+        raise RequestError(
+            f"cannot use {str(max_gap)[:40]} as the length of the longest gap",
+            "it is a number of frames, or of seconds, and more than none",
+            'Write --max-gap 90, or --max-gap 3s (max_gap=90 or "3s" in Python).',
+        )
+    return int(frames)
 
 
 @dataclass(frozen=True, eq=False)

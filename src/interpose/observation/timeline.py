@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP, turn, wrap
 from interpose.geometry.time import resample
@@ -233,10 +234,9 @@ def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
     """The length of each gap, None where it is to be chosen."""
     if frames == "auto":
         return [None] * gaps
-    whole = int | np.integer
-    said = [frames] * gaps if isinstance(frames, whole) else frames
+    said: Any = [frames] * gaps if is_number(frames) else frames
     counts = isinstance(said, Sequence | np.ndarray) and not isinstance(said, str)
-    if not counts or not all(isinstance(count, whole) and count > 0 for count in said):
+    if not counts or not all(is_number(count, 1, whole=True) for count in said):
         raise RequestError(
             f"cannot generate {frames} frames", "it takes numbers from 1 on, or auto", "Write --frames 45."
         )

@@ -17,11 +17,11 @@ from interpose.geometry.time import resample
 from interpose.methods import auto
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Part, Pin
-from interpose.observation.observation import frame_number
+from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
 from interpose.skeletons import find_humanoid
 from interpose.tasks.moments import mended, momentary, with_moments
-from interpose.tasks.planning import plan
+from interpose.tasks.planning import plan, seed_of
 from interpose.tasks.windows import CONTEXT, OVERLAP, joined, paste, put_together, shifted, together
 
 
@@ -29,8 +29,8 @@ def fill(
     clip: Clip,
     gaps: Sequence[Gap] | Observation,
     method: str = "auto",
-    max_gap: int | None = None,
-    only: Sequence[int] | None = None,
+    max_gap: int | str | None = None,
+    only: Iterable[int] | int | None = None,
     seed: int | None = None,
     methods: Mapping[int, str] | None = None,
     progress: Callable[[float], None] | None = None,
@@ -49,7 +49,7 @@ def fill(
             touch or overlap count as one.
         method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length:
             values that an observation misses for moments it interpolates one by one.
-        max_gap: frames; longer gaps stay open.
+        max_gap: frames, or seconds as in "2s"; longer gaps stay open.
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
         seed: for methods that sample.
         methods: the method of single gaps by number, in place of `method`.
@@ -66,13 +66,14 @@ def fill(
         The completion; `report.open` lists the gaps left open.
 
     Raises:
-        RequestError: a range, a joint, a gap number, a method or an action that does not exist; nothing
-            observed; a part that does not fit; a path, or a pin, outside of the gaps.
+        RequestError: a range, a joint, a gap number, a method or an action that does not exist; a length or a
+            seed that is none; nothing observed; a part that does not fit; a path, or a pin, outside of the
+            gaps.
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     observation.check(clip)
-    if seed is not None and seed < 0:
-        raise RequestError(f"cannot take the seed {seed}", "it is a number from 0 on", "Write --seed 1.")
+    seed = seed_of(seed)
+    max_gap = None if max_gap is None else longest(max_gap, clip.fps)
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, fitted(parts, clip))
     piecemeal = isinstance(gaps, Observation) and not observation.pins

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
 from interpose.finish.opinion import refusal
 from interpose.methods import registry
 from interpose.methods.protocol import Sampler
 from interpose.observation import Gap, Observation, timeline
 from interpose.tasks.filling import fill
-from interpose.tasks.planning import plan
+from interpose.tasks.planning import plan, seed_of
 
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
 HOTTEST = 10.0  # times the noise of the training that may be injected
@@ -66,16 +66,17 @@ def forecast(
     """
     frames = round(AHEAD * clip.fps) if frames is None else frames
     for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
-        if not isinstance(count, int | np.integer) or count < 1:
+        if not is_number(count, 1, whole=True):
             raise RequestError(
-                f"cannot forecast {count} {what}s",
+                f"cannot forecast {str(count)[:40]} {what}s",
                 "it is a whole number from 1 on",
                 f"Write for example {fix}.",
             )
+    frames, samples, seed = int(frames), int(samples), seed_of(seed)
     timeline.bounded(frames, clip.fps)
-    if not 0 <= temperature <= HOTTEST:
+    if not is_number(temperature, 0, HOTTEST):
         raise RequestError(
-            f"cannot sample at temperature {temperature:g}",
+            f"cannot sample at temperature {str(temperature)[:40]}",
             "the noise is multiplied with it",
             f"Choose 0 to {HOTTEST:g}: 1 is what the network was trained with.",
         )

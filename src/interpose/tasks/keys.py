@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
 from interpose.observation import Gap, Pin
 from interpose.observation.observation import frame_number
@@ -42,7 +42,7 @@ def between(
     Raises:
         RequestError: too few keys, one outside of the clip, nothing between them, an unknown action.
     """
-    chosen = sorted({frame_number(key) for key in keys})
+    chosen = sorted({frame_number(key) for key in ([keys] if is_number(keys) else keys)})
     if bad := [key for key in chosen if not 0 <= key < len(clip)]:
         raise RequestError(
             f"there is no frame {bad[0]}",

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.finish import pins as pinning
 from interpose.geometry.time import runs
 from interpose.methods import auto, registry
@@ -32,7 +32,7 @@ def plan(
     observation: Observation,
     method: str,
     max_gap: int | None,
-    only: Sequence[int] | None,
+    only: Iterable[int] | int | None,
     methods: Mapping[int, str],
     action: str = "",
     temperature: float = 1.0,
@@ -40,17 +40,20 @@ def plan(
     """The runs of incomplete frames, numbered in order of time, each with its method; pins are checked."""
     pinning.check(clip, observation)
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
-    for number in (*(only or ()), *methods):
-        if not 1 <= number <= len(spans):
+    wanted = (
+        range(1, len(spans) + 1) if only is None else list(only) if isinstance(only, Iterable) else [only]
+    )
+    for number in (*wanted, *methods):
+        if not is_number(number, 1, len(spans), whole=True):
             raise RequestError(
-                f"there is no gap number {number}",
+                f"there is no gap number {str(number)[:40]}",
                 f"the clip has {len(spans)} gaps, counted from 1 in order of time",
                 "A dry run lists them: --dry-run.",
             )
     jobs = []
     for number, gap in enumerate(spans, 1):
         lead = _lead(observation, gap)
-        open_ = (max_gap is not None and len(lead) > max_gap) or (only is not None and number not in only)
+        open_ = (max_gap is not None and len(lead) > max_gap) or number not in wanted
         name, note = methods.get(number, method), None
         if name == "auto" and action:
             chosen = auto.choose_told(clip, lead, action)
@@ -66,6 +69,19 @@ def plan(
             )
         jobs.append(Job(number, gap, None if open_ else chosen, note))
     return jobs
+
+
+def seed_of(seed: object) -> int | None:
+    """A seed as an int, or None for none; RequestError for what cannot be one."""
+    if seed is None:
+        return None
+    if not is_number(seed, 0, whole=True):
+        raise RequestError(
+            f"cannot take the seed {str(seed)[:40]}",
+            "it is a whole number from 0 on",
+            "Write --seed 1 (seed=1 in Python).",
+        )
+    return int(seed)
 
 
 def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[Method, str | None]:

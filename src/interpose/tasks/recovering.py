@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, is_number
 from interpose.finish import Completion, Provenance
 from interpose.finish.denoise import denoised
 from interpose.finish.feet import legs
@@ -20,6 +20,7 @@ from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
+from interpose.tasks.planning import seed_of
 
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
@@ -95,11 +96,13 @@ def denoise(
         seed: for methods that sample.
 
     Raises:
-        RequestError: too few frames, a strength below 0 or above 100, a joint or range that does not exist.
+        RequestError: too few frames, a strength that is none from 0 to 100, a joint or range that does not
+            exist.
     """
-    if not 0 <= strength <= STRONGEST:
+    seed = seed_of(seed)
+    if not is_number(strength, 0, STRONGEST):
         raise RequestError(
-            f"cannot denoise with strength {strength:g}",
+            f"cannot denoise with strength {str(strength)[:40]}",
             "the estimated noise is multiplied with it",
             f"Choose 0 to {STRONGEST:g}: 1 trusts the estimate, 2 smooths more.",
         )
