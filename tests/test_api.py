@@ -148,6 +148,24 @@ def test_what_does_not_fit_is_said(cmu_walk):
             request()
 
 
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda clip: interpose.fill(clip, "120-160"),
+        lambda clip: interpose.forecast(clip, 0),
+        lambda clip: interpose.between(clip, [0, 30], "walk", method="spline"),
+        lambda clip: interpose.forecast(clip, 10, samples=2, method="spline"),
+        lambda clip: interpose.stitch([clip, clip], "many"),
+    ],
+)
+def test_advice_can_be_followed_in_python(cmu_walk, ask):
+    """It is the same for the command line, and so names no option alone."""
+    with pytest.raises(interpose.RequestError) as error:
+        ask(cmu_walk)
+    assert error.value.fix
+    assert "--" not in error.value.fix
+
+
 @pytest.mark.parametrize("gap", [slice(10, 20), 7, [slice(10, 20)]])
 def test_gaps_that_are_none_say_how_to_write_one(cmu_walk, gap):
     with pytest.raises(interpose.RequestError, match="cannot read the gap") as failed:

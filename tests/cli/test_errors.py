@@ -30,7 +30,7 @@ def three_lines(err: str) -> list[str]:
         (["--gap", "60:60"], "60:60"),
         (["--gap", "100:200"], "163 frames"),
         (["--gap", "-5:20"], "-5:20"),
-        (["--gap", "60-80"], "--gap 120:160"),
+        (["--gap", "60-80"], "Write 120:160"),
         (["--gap", "60:80", "--joints", "LeftArn"], "Did you mean LeftArm"),
         (["--gap", "60:80", "--joints", ","], "--joints"),
         (["--joints", "leftarm"], "Did you mean LeftArm"),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -149,6 +151,17 @@ def test_the_whole_benchmark(published):
     assert result.to_dict()["rows"]["linear"]["5"]["ratios"]["l2q"] == 1
     assert "| zero-velocity |" in str(result)
     assert f"| truth | {result.truth[5]} |" in str(result)
+    assert result.plot().startswith("<svg")
+
+
+def test_a_gap_of_one_frame_has_no_ratio_of_spectra(published):
+    """There is no motion in it, so that NPSS is zero whatever is filled in; JSON has no word for NaN."""
+    result = lafan1.run(published, "test", gaps=(1,), methods=("spline",), most=1)
+    assert np.isnan(result.ratio("zero-velocity", 1, "npss"))
+    assert "| zero-velocity | 0.00000 (-) |" in str(result)
+    assert result.ratio("linear", 1, "l2p") == 1
+    said = json.loads(json.dumps(result.to_dict(), allow_nan=False))
+    assert said["rows"]["spline, finished"]["1"]["ratios"]["npss"] is None
     assert result.plot().startswith("<svg")
 
 

@@ -7,6 +7,7 @@ where sequences are missing from it only the ratio to interpolation can.
 
 from __future__ import annotations
 
+import math
 import re
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -309,28 +310,36 @@ class Lafan1:
     truth: dict[int, Seen] = field(default_factory=dict)
 
     def ratio(self, row: str, gap: int, figure: str) -> float:
-        """To the protocol's own interpolation."""
-        return float(
-            getattr(self.rows[row][gap], figure) / getattr(self.rows[self.protocol.base][gap], figure)
-        )
+        """To the protocol's own interpolation; NaN where that is not off at all, as NPSS of one frame is."""
+        base = getattr(self.rows[self.protocol.base][gap], figure)
+        return float(getattr(self.rows[row][gap], figure) / base) if base else math.nan
 
     def to_dict(self) -> dict[str, Any]:
+        """For JSON, which has no NaN: None stands for it."""
+
+        def held(figures: dict[str, Any]) -> dict[str, Any]:
+            return {
+                name: None if math.isnan(value) else value
+                for name, value in figures.items()
+                if isinstance(value, float)
+            }
+
         return {
             "protocol": self.protocol.name,
             "data": self.name,
             "split": self.split,
             "windows": {str(gap): count for gap, count in self.windows.items()},
-            "truth": {str(gap): vars(seen) for gap, seen in self.truth.items()},
+            "truth": {str(gap): held(vars(seen)) for gap, seen in self.truth.items()},
             "rows": {
                 name: {
                     str(gap): {
-                        **{key: value for key, value in vars(row).items() if isinstance(value, float)},
-                        **(vars(row.seen) if row.seen else {}),
-                        "ratios": {key: self.ratio(name, gap, key) for key in ("l2p", "l2q", "npss")},
+                        **held(vars(row)),
+                        **(held(vars(row.seen)) if row.seen else {}),
+                        "ratios": held({key: self.ratio(name, gap, key) for key in ("l2p", "l2q", "npss")}),
                     }
-                    for gap, row in held.items()
+                    for gap, row in rows.items()
                 }
-                for name, held in self.rows.items()
+                for name, rows in self.rows.items()
             },
         }
 
@@ -339,7 +348,9 @@ class Lafan1:
 
         def cell(name: str, gap: int) -> str:
             row = self.rows[name][gap]
-            said = f"{getattr(row, figure):.{digits}f} ({self.ratio(name, gap, figure):.2f})"
+            ratio = self.ratio(name, gap, figure)
+            told = "-" if math.isnan(ratio) else f"{ratio:.2f}"
+            said = f"{getattr(row, figure):.{digits}f} ({told})"
             # The figures are then rather those of another method.
             fell = row.fell_back or 0.0
             return f"{said}, {100 * fell:.0f} % the spline's" if fell > SPOILT else said

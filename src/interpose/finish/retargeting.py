@@ -74,7 +74,7 @@ def on_rig_of(clip: Clip, like: Clip) -> Clip:
                 error.what,
                 f"{error.why}; and {one.name or 'one of them'} is no humanoid, whose motion could be brought"
                 f" onto other rigs: nothing was found for {', '.join(lacking)}",
-                "Name its joints with --map, or use clips of one rig.",
+                "Name its joints, load(..., roles=...) or --map, or use clips of one rig.",
             )
         if not len(one):
             what = f"cannot bring {clip.name or 'a clip'} onto another rig"

@@ -133,7 +133,7 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
             part.unlink(missing_ok=True)
     except OSError as error:
         raise FileError(
-            f"cannot write {path}", error.strerror or str(error), "Choose another folder with -o."
+            f"cannot write {path}", error.strerror or str(error), "Choose another folder."
         ) from None
     return (*notes, *_alone(path))
 

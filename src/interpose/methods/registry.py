@@ -105,7 +105,7 @@ def acting(method: Method, action: str) -> Method:
         raise RequestError(
             f"cannot make it {action} with {method.name}",
             f"{method.name} knows no actions",
-            "Use --method cmib.",
+            "Use the method cmib.",
         )
     return method.for_action(action)
 
@@ -125,7 +125,7 @@ def one_answer(what: str) -> RequestError:
     return RequestError(
         what,
         "it has one answer only",
-        f"Use --method {' or '.join(others)}."
+        f"Use the method {' or '.join(others)}."
         if others
         else "No method that is installed draws samples yet.",
     )

@@ -194,7 +194,7 @@ def allowed(card: Card) -> Card:
         raise RequestError(
             f"the weights of {card.name} are not open",
             f"their licence: {card.licence}",
-            f"Use --method {' or '.join([*others, 'spline'])}, or leave out --license open.",
+            f"Use the method {' or '.join([*others, 'spline'])}, or allow any licence: --license any.",
         )
     return card
 
@@ -209,7 +209,7 @@ def find(method: str) -> Card:
     raise RequestError(
         f"there are no weights for the method {method}",
         f"none lie in {' or '.join(map(str, folders())) or 'any of the places for them'}",
-        "Install those for research, too (pip install ./weights), or use --method spline.",
+        "Install those for research, too (pip install ./weights), or use the method spline.",
     )
 
 

@@ -65,7 +65,7 @@ class Gap:
             raise RequestError(
                 f"cannot read the gap {text!r}",
                 "a gap is a range of frames START:STOP, and STOP is the first frame after it",
-                "Write --gap 120:160 for the frames 120 to 159, or --gap 4s:5.3s.",
+                "Write 120:160 for the frames 120 to 159, or 4s:5.3s.",
             ) from None
 
     def check(self, frames: int) -> Gap:

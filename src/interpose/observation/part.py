@@ -102,7 +102,7 @@ def _check(clip: Clip, observation: Observation, part: Part) -> None:
         raise RequestError(
             "the two clips have different frame rates",
             f"one has {clip.fps:g} and the other {part.clip.fps:g} frames a second",
-            "Bring the other one to the same rate first: interpose convert --fps.",
+            "Bring the other one to the same rate first: interpose.resample, or interpose convert --fps.",
         )
     stop = part.at + part.stop - part.start
     joints = [clip.skeleton.index(name) for name in part.joints]
@@ -110,7 +110,7 @@ def _check(clip: Clip, observation: Observation, part: Part) -> None:
         raise RequestError(
             f"the frames {part.at}:{stop} do not lie in a gap",
             "joints of another clip can only be used where those of this one are missing",
-            "Move them with --at, take fewer with --from-range, or make the gap longer.",
+            "Move them (at, --at), take fewer of them (stop, --from-range), or make the gap longer.",
         )
     if odd := misfits(clip, part):
         raise RequestError(

@@ -159,7 +159,7 @@ def lay(
     """
     clips = list(clips)
     if not clips or (len(clips) == 1 and not loop):
-        fix = "Name two clips or more, or let one go round: --loop."
+        fix = "Name two clips or more, or let one go round: --loop (loop=True)."
         raise RequestError(
             "there is nothing to stitch", f"it takes two clips, and {len(clips)} is there", fix
         )
@@ -238,7 +238,7 @@ def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
     counts = isinstance(said, Sequence | np.ndarray) and not isinstance(said, str)
     if not counts or not all(is_number(count, 1, whole=True) for count in said):
         raise RequestError(
-            f"cannot generate {frames} frames", "it takes numbers from 1 on, or auto", "Write --frames 45."
+            f"cannot generate {frames} frames", "it takes numbers from 1 on, or auto", "Write 45, or auto."
         )
     if len(said) != gaps:
         raise RequestError(

@@ -79,7 +79,7 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
         raise RequestError(
             "the skeleton has no T-pose",
             f"it has no joints for {', '.join(mapping.lacking)}",
-            "Map them with --map.",
+            "Say which joints they are: load(..., roles=...), or --map.",
         )
     skeleton = mapping.skeleton
     if frame is not None:

@@ -65,12 +65,12 @@ def forecast(
             does not have, and what `fill` refuses.
     """
     frames = round(AHEAD * clip.fps) if frames is None else frames
-    for what, count, fix in (("frame", frames, "--frames 60"), ("sample", samples, "--samples 5")):
+    for what, count, fix in (("frame", frames, 60), ("sample", samples, 5)):
         if not is_number(count, 1, whole=True):
             raise RequestError(
                 f"cannot forecast {str(count)[:40]} {what}s",
                 "it is a whole number from 1 on",
-                f"Write for example {fix}.",
+                f"Ask for {fix} {what}s, for example.",
             )
     frames, samples, seed = int(frames), int(samples), seed_of(seed)
     timeline.bounded(frames, clip.fps)

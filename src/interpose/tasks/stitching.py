@@ -122,7 +122,7 @@ def cycle(clip: Clip) -> Cycle:
         raise RequestError(
             f"no part of {clip.name or 'the clip'} goes round",
             "no pose of it is like one that was there half a second to eight seconds before",
-            "Leave out --trim: then a way back to the beginning is generated.",
+            "Loop all of it, without --trim: then a way back to the beginning is generated.",
         )
     begin, end, apart = found
     bridge = min(max(2, round(BRIDGE * clip.fps)), end - begin - 2)
