@@ -233,15 +233,65 @@ def test_a_foot_lets_go_before_its_leg_is_straight(cmu_walk):
     assert np.abs(np.diff(share)).max() < 0.5
 
 
-def test_a_foot_does_not_leap_from_one_contact_to_the_next(cmu_walk):
-    places = np.zeros((60, 3))
-    first = feet.Contact(10, 30, np.tile([0.1, 0.0, 0.0], (60, 1)), (False, False))
-    near = feet.Contact(31, 40, np.tile([0.13, 0.0, 0.0], (60, 1)), (False, False))
-    far = feet.Contact(31, 40, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, False))
-    later = feet.Contact(45, 55, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, False))
-    tied = feet.Contact(31, 40, np.tile([0.4, 0.0, 0.0], (60, 1)), (False, True))
+def contact(start: int, stop: int, off: float, tied: tuple[bool, bool] = (False, False)) -> feet.Contact:
+    return feet.Contact(start, stop, start, stop - 1, np.tile([off, 0.0, 0.0], (60, 1)), tied)
+
+
+def test_a_foot_does_not_leap_from_one_contact_to_the_next():
+    first, near, far, later = (
+        contact(10, 30, 0.1),
+        contact(31, 40, 0.13),
+        contact(31, 40, 0.4),
+        contact(45, 55, 0.4),
+    )
+    tied = contact(31, 40, 0.4, (False, True))
     for second, kept in ((near, [first, near]), (far, [first]), (later, [first, later]), (tied, [tied])):
-        assert feet._apart([first, second], places, 30.0) == kept
+        assert feet._apart([first, second], 30.0) == kept
+
+
+def test_ankle_and_toe_are_held_as_one_foot():
+    """The toe stands from observed frames on and glides away from there by 30 cm; in the midst of it the
+    ankle is slow, too: held where it is by then it would go back and forth by a quarter of a metre."""
+    glide = np.zeros((90, 2, 3))
+    glide[:, :, 2] = np.interp(np.arange(90), [20, 60], [0.0, 0.3])[:, None]
+    glide[:, 1, 2] += 0.15
+    planted = np.zeros((90, 2), bool)
+    planted[5:60, 1] = planted[35:45, 0] = True
+    movable = np.arange(90) >= 10
+    feet_held = glide + feet._hold(glide, planted, movable, 30.0, 4.5)
+    np.testing.assert_allclose(feet_held[10:47, 1, 2], 0.15, atol=0.01)
+    apart = np.linalg.norm(feet_held[:, 1] - feet_held[:, 0], axis=-1)
+    assert np.abs(apart - 0.15).max() < 0.11
+    # Those of one foot may differ by what a foot turns by.
+    for off, kept in ((0.08, [1, 1]), (0.2, [0, 1])):
+        ankle, toe = contact(20, 30, 0.0), contact(10, 50, off)
+        assert [len(held) for held in feet._in_one([[ankle], [toe]])] == kept
+
+
+@pytest.mark.parametrize("seam", [0, 20])
+def test_a_long_way_to_where_a_foot_is_held_takes_longer(seam):
+    """30 cm, for a foot that slides towards where it stands in known frames after the gap."""
+    glide = np.zeros((100, 2, 3))
+    glide[:, :, 2] = np.interp(np.arange(100), [20, 80], [0.3, 0.0])[:, None]
+    planted = np.zeros((100, 2), bool)
+    planted[20:] = True
+    movable = (np.arange(100) >= seam) & (np.arange(100) < 80)
+    shift = feet._hold(glide, planted, movable, 30.0, 4.5)
+    np.testing.assert_allclose((glide + shift)[45:, :, 2], 0.0, atol=0.01)
+    assert not shift[:seam].any()
+    assert np.abs(np.diff(shift[..., 2], axis=0)).max() * 30 < 2.2 * feet.RUSH
+
+
+def test_a_contact_of_one_frame_is_none(walk):
+    """A method that doubts whether feet stand from frame 55 on, but for one frame: that one changes nothing
+    (it made feet leave at once)."""
+    known, drift = gaps_of(walk, (45, 75)), np.clip((np.arange(120) - 45) / 30, 0, 1)[:, None, None]
+    slid = walk.with_motion(walk.rotation, walk.translation + drift * [0.0, 0.0, 0.06])
+    stands = np.full((120, 4), 0.9)
+    stands[55:] = 0.1
+    without = feet.plant(slid, known, (45, 75), stands=stands)
+    stands[56] = 0.9
+    assert feet.plant(slid, known, (45, 75), stands=stands).rotation.tobytes() == without.rotation.tobytes()
 
 
 def test_a_stance_between_two_low_steps_is_one():
