@@ -233,6 +233,26 @@ def test_a_foot_lets_go_before_its_leg_is_straight(cmu_walk):
     assert np.abs(np.diff(share)).max() < 0.5
 
 
+def test_a_foot_that_swivels_is_not_led_through_itself(walk):
+    """Who turns half round on the spot in a second, without a step: ankle and toe stand at both ends, and
+    straight ways from there to there cross."""
+    ankles = walk.positions()[:, [leg.ankle for leg in feet.legs(walk.skeleton)]]
+    frames = np.full(61, np.linalg.norm(ankles[:, 0] - ankles[:, 1], axis=-1).argmin())
+    share = np.clip((np.arange(61) - 15) / 30, 0, 1)
+    about = np.zeros((61, 3))
+    about[:, 1] = np.pi * 0.99 * share**2 * (3 - 2 * share)
+    still = walk.with_motion(walk.rotation[frames], walk.translation[frames])
+    centre = still.positions()[0, feet.ends(walk.skeleton)].mean(axis=0) * [1.0, 0.0, 1.0]
+    spun = still.with_motion(still.rotation.copy(), still.translation.copy())
+    spun.rotation[:, 0] = rotations.multiply(rotations.exp(about), still.rotation[:, 0])
+    spun.translation[:, 0] = rotations.rotate(rotations.exp(about), still.translation[:, 0] - centre) + centre
+    held = feet.plant(spun, gaps_of(spun, (1, 60)), (1, 60)).positions()
+    for leg in feet.legs(walk.skeleton):
+        ahead = (held[:, leg.toe] - held[:, leg.ankle])[:, [2, 0]]
+        turned = np.degrees(np.diff(np.unwrap(np.arctan2(ahead[:, 1], ahead[:, 0]))))
+        assert np.abs(turned).max() < 25.0
+
+
 def contact(start: int, stop: int, off: float, tied: tuple[bool, bool] = (False, False)) -> feet.Contact:
     return feet.Contact(start, stop, start, stop - 1, np.tile([off, 0.0, 0.0], (60, 1)), tied)
 

@@ -48,6 +48,9 @@ RUSH = 0.6
 APART = 0.10
 # The share of its length at which a leg begins to be straight.
 TAUT = 0.97
+# Radians by which holding may turn a foot: from the first on it lets go, at twice as much it has. Ankle and
+# toe of one that swivels are led past each other.
+SWIVEL = np.radians(30.0)
 # Metres by which a foot may be under what it rests on.
 STEP_UP = 0.02
 # Seconds of observed motion beside a gap in which stances are looked for.
@@ -444,7 +447,8 @@ def _in_one(both: list[list[Contact]]) -> list[list[Contact]]:
 
 def _let_go(leg: Leg, placed: np.ndarray, shift: np.ndarray, over: float) -> np.ndarray:
     """(F,) the share of shifts (F, 2, 3) of ankle and toe that a leg follows: less where it would have to be
-    straight for it, before which a foot lets go. Held until then, its knee would snap when the foot leaves.
+    straight for it, before which a foot lets go, or where its foot would turn far. Held until then, its knee
+    would snap when the foot leaves, or the foot go round at once.
 
     placed: (F, J, 3); over: frames over which it lets go.
     """
@@ -452,7 +456,11 @@ def _let_go(leg: Leg, placed: np.ndarray, shift: np.ndarray, over: float) -> np.
     length = np.linalg.norm(knee - hip, axis=-1) + np.linalg.norm(ankle - knee, axis=-1)
     own, asked = (np.linalg.norm(some - hip, axis=-1) / length for some in (ankle, ankle + shift[:, 0]))
     taut = ramp((asked - np.maximum(own, TAUT)) / (1 - TAUT))
-    return np.asarray(1.0 - np.minimum(spread(taut, over), 1.0))
+    foot = (placed[:, leg.foot[1]] - ankle)[:, [0, 2]]
+    held = foot + (shift[:, 1] - shift[:, 0])[:, [0, 2]]
+    across = foot[:, 0] * held[:, 1] - foot[:, 1] * held[:, 0]
+    turned = ramp(np.abs(np.arctan2(across, (foot * held).sum(axis=-1))) / SWIVEL - 1)
+    return np.asarray(1.0 - np.minimum(spread(np.maximum(taut, turned), over), 1.0))
 
 
 def reach(

@@ -103,7 +103,7 @@ def find_rest(mapping: Mapping, clip: Clip | None = None, frame: int | None = No
     pose = _kind(mapping, placed)
     if pose != "none":
         return Rest(_from_pose(mapping, turned, placed), pose, "zero pose")
-    if known := known_rest(skeleton):
+    if known := known_rest(mapping):
         return Rest(known[1], pose, "rig")
     if clip is None or len(clip) == 0:
         raise RequestError(

@@ -14,6 +14,7 @@ import numpy as np
 
 from interpose.clip import Skeleton
 from interpose.geometry import kinematics, rotations
+from interpose.skeletons.mapping import Mapping
 
 RIGS = Path(__file__).with_name("rigs.json")
 LEAST = 0.01  # metres: bones that are shorter have no direction
@@ -39,16 +40,23 @@ def directions(skeleton: Skeleton) -> np.ndarray:
     return np.where(length > LEAST, away / np.maximum(length, LEAST), 0.0)
 
 
-def known_rest(skeleton: Skeleton) -> tuple[str, np.ndarray] | None:
-    """The name and the T-pose (22, 4) of the rig that a skeleton is, or None for all others.
+def known_rest(mapping: Mapping) -> tuple[str, np.ndarray] | None:
+    """The name and the T-pose (22, 4) of the rig that a mapped skeleton is, or None for all others.
 
-    Names, their order, and the zero pose must be those of the rig.
+    Names, what hangs from what, and the zero pose must be those of the rig. A namespace before the names,
+    joints above the hips, and those beside the body (a prop, a tail) make it no other rig.
     """
+    skeleton = mapping.skeleton
+    joints = {skeleton.names[joint].rpartition(":")[2]: joint for joint in mapping.mapped[1]}
     for rig in _rigs():
-        if list(skeleton.names) != rig["names"]:
+        its = {name: np.array(way) for name, way in zip(rig["names"], rig["directions"])}
+        bones = [name for name, way in its.items() if way.any()]
+        if not set(bones) <= joints.keys() <= its.keys():
             continue
-        own, its = directions(skeleton), np.array(rig["directions"])
-        both = (own != 0).any(axis=1) & (its != 0).any(axis=1)
-        if both.any() and ((own * its).sum(axis=1)[both] > LIKE).all():
+        at = [joints[name] for name in bones]
+        own = directions(skeleton)[at]
+        hangs = all(skeleton.parents[joint] in joints.values() for joint in at)
+        alike = (own * [its[name] for name in bones]).sum(axis=1) > LIKE
+        if hangs and alike[own.any(axis=1)].all() and own.any():
             return rig["rig"], rotations.normalize(np.array(rig["rotation"]))
     return None
