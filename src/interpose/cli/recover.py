@@ -82,7 +82,7 @@ def recover(
     gap.check(len(clip))
     for name in chosen or ():
         clip.skeleton.index(name)
-    outputs = Outputs.choose(file, output, "recovered", player)
+    outputs = Outputs.choose(file, output, "recover", player)
     if not dry_run:
         outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:

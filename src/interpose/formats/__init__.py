@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import difflib
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,6 +10,7 @@ from typing import Any, NamedTuple
 from interpose.clip import Clip
 from interpose.errors import FileError, RequestError
 from interpose.formats import asf_amc, bvh, npz
+from interpose.formats.whole import replacing
 
 __all__ = ["FORMATS", "Format", "held", "load", "save"]
 
@@ -122,19 +122,10 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         why = "the clip has no frames, and no file without any could be read again"
         raise RequestError(f"cannot write {path}", why, "Give a clip of one frame or more.")
     _check_free(path, force)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            with part.open("wb") as stream:
-                notes = chosen.write(clip, stream)
-            _check_free(path, force)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"cannot write {path}", error.strerror or str(error), "Choose another folder."
-        ) from None
+    with replacing(path) as part:
+        with part.open("wb") as stream:
+            notes = chosen.write(clip, stream)
+        _check_free(path, force)
     return (*notes, *_alone(path))
 
 
