@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import difflib
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from interpose.clip import Clip
-from interpose.errors import FileError, RequestError
+from interpose.errors import FileError, RequestError, unfit
 from interpose.formats import asf_amc, bvh, npz
 from interpose.formats.whole import replacing
 
@@ -61,7 +62,7 @@ def load(
         FileError: the file is missing, unreadable or damaged; the message says what to do.
         RequestError: the suffix or an option is wrong.
     """
-    path = Path(path)
+    path = _path(path)
     chosen = _format(path)
     if roles is not None and not isinstance(roles, Mapping):
         raise RequestError(
@@ -116,7 +117,7 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
     if not isinstance(clip, Clip):
         hint = "Give its .clip." if isinstance(getattr(clip, "clip", None), Clip) else "Give a clip."
         raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
-    path = Path(path)
+    path = _path(path)
     chosen = _format(path)
     if not len(clip):
         why = "the clip has no frames, and no file without any could be read again"
@@ -136,8 +137,15 @@ def _alone(path: Path) -> tuple[str, ...]:
     try:
         asf_amc.find_asf(path)
     except FileError:
-        return (f"{path.name} is read with its .asf file: put that beside it, or name it with --skeleton",)
+        where = "put that beside it, or name it with --skeleton (skeleton= in Python)"
+        return (f"{path.name} is read with its .asf file: {where}",)
     return ()
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, str | os.PathLike):
+        raise unfit("path", path, "the path of a file")
+    return Path(path)
 
 
 def _format(path: Path) -> Format:
