@@ -276,3 +276,28 @@ def test_who_reads_along_may_stop(run, takes, monkeypatch):
     done = run("scan", "takes")
     assert done.code == 0
     assert "foreseen" not in done.err
+
+
+def test_two_processes_may_meet(run, takes, monkeypatch):
+    """What another one has written meanwhile is skipped, as what was there before."""
+    assert run("denoise", "takes/a.bvh", "-o", "other.bvh").code == 0
+    check = Outputs.check
+
+    def meanwhile(self, *given, **named):  # type: ignore[no-untyped-def]
+        for suffix in (".bvh", ".json"):
+            shutil.copy(takes.parent / f"other{suffix}", self.clip.with_suffix(suffix))
+        check(self, *given, **named)
+
+    monkeypatch.setattr(Outputs, "check", meanwhile)
+    assert run("denoise", "takes/a.bvh", "takes/b.bvh").code == 2
+    for made in takes.glob("*.denoised.*"):
+        made.unlink()
+    done = run("denoise", "takes/a.bvh", "takes/b.bvh", "--skip-existing")
+    assert done.code == 0
+    assert "2 of 2 files done; 2 skipped" in done.err
+
+
+def test_a_file_that_looks_like_an_option_is_one(run, takes):
+    (takes / "a.bvh").rename(takes.parent / "-a.bvh")
+    assert "Write ./-a.bvh for the file." in run("scan", "-a.bvh").err
+    assert run("scan", "./-a.bvh").code == 0

@@ -50,13 +50,20 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
 
         def one(path: Path) -> tuple[int, bool]:
             """The exit code, and whether the result was there already."""
-            if skip_existing:
-                chosen = options.get("output"), verb.__name__, bool(options.get("player"))
-                outputs = Outputs.choose(path, *chosen)
-                if (report := outputs.earlier(verb.__name__)) is not None:
-                    _tell_skipped(path, outputs, report, bool(options.get("json")))
-                    return 4 if report["open"] or report.get("left") else 0, True
-            return verb(path, **options) or 0, False
+            if not skip_existing:
+                return verb(path, **options) or 0, False
+            name, player = verb.__name__, bool(options.get("player"))
+            outputs = Outputs.choose(path, options.get("output"), name, player)
+            report = outputs.earlier(name)
+            if report is None:
+                try:
+                    return verb(path, **options) or 0, False
+                except RequestError:
+                    # Another process may have done it meanwhile.
+                    if (report := outputs.earlier(name)) is None:
+                        raise
+            _tell_skipped(path, outputs, report, bool(options.get("json")))
+            return 4 if report["open"] or report.get("left") else 0, True
 
         if not more and not file.is_dir() and (folder is None or not folder.is_dir()):
             return one(file)[0]
