@@ -301,3 +301,25 @@ def test_a_file_that_looks_like_an_option_is_one(run, takes):
     (takes / "a.bvh").rename(takes.parent / "-a.bvh")
     assert "Write ./-a.bvh for the file." in run("scan", "-a.bvh").err
     assert run("scan", "./-a.bvh").code == 0
+
+
+def test_a_folder_is_converted_into_a_folder(run, takes):
+    (takes / "day").mkdir()
+    (takes / "b.bvh").rename(takes / "day" / "b.bvh")
+    done = run("convert", "takes", "half", "--fps", "15", "--drop-repeated")
+    assert done.code == 3, "one cannot be read"
+    assert "2 of 3 files done; 1 could not be done: takes/c.bvh" in done.err
+    made = takes.parent / "half"
+    assert sorted(str(path.relative_to(made)) for path in made.rglob("*.*")) == ["a.bvh", "day/b.bvh"]
+    assert load(made / "day" / "b.bvh").fps == 15
+    (takes / "c.bvh").unlink()
+    assert run("convert", "takes", "half").code == 2, "nothing is overwritten"
+    (made / "a.bvh").unlink()
+    again = run("convert", "takes", "half", "--fps", "15", "--skip-existing")
+    assert again.code == 0
+    assert "2 of 2 files done; 1 skipped" in again.err
+    assert run("convert", "takes", "other", "--to", "npz").code == 0
+    assert (takes.parent / "other" / "day" / "b.npz").exists()
+    assert run("convert", "takes/a.bvh", "other").code == 0, "one clip goes into a folder, too"
+    assert (takes.parent / "other" / "a.bvh").exists()
+    assert "does not apply to one file" in run("convert", "takes/a.bvh", "a.npz", "--to", "npz").err

@@ -30,7 +30,11 @@ SKIP_EXISTING = """
     """
 
 
-def each(verb: Callable[..., int | None]) -> Callable[..., int]:
+# What an earlier run made of a clip, by the options of this one, and its report; None where it made nothing.
+Earlier = Callable[[Path, dict[str, Any]], "tuple[Path, dict[str, Any]] | None"]
+
+
+def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Callable[..., int]:
     """The verb of one file, for several and for folders: what cannot be done is said, and the next one is.
 
     Its exit code is the largest of those that could not be done, or else of all. With --json it prints one
@@ -40,6 +44,7 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
 
     signature = inspect.signature(verb)
     writes = "output" in signature.parameters
+    before = earlier or _by_report(verb.__name__)
 
     @wraps(verb)
     def many(file: Path, /, *more: Path, skip_existing: bool = False, **options: Any) -> int:
@@ -52,18 +57,19 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
             """The exit code, and whether the result was there already."""
             if not skip_existing:
                 return verb(path, **options) or 0, False
-            name, player = verb.__name__, bool(options.get("player"))
-            outputs = Outputs.choose(path, options.get("output"), name, player)
-            report = outputs.earlier(name)
-            if report is None:
+            if (found := before(path, options)) is None:
                 try:
                     return verb(path, **options) or 0, False
                 except RequestError:
                     # Another process may have done it meanwhile.
-                    if (report := outputs.earlier(name)) is None:
+                    if (found := before(path, options)) is None:
                         raise
-            _tell_skipped(path, outputs, report, bool(options.get("json")))
-            return 4 if report["open"] or report.get("left") else 0, True
+            made, report = found
+            if options.get("json"):
+                say_json({**report, "skipped": True})
+            else:
+                say(f"skipped {path}: {made} is there already")
+            return 4 if report.get("open") or report.get("left") else 0, True
 
         if not more and not file.is_dir() and (folder is None or not folder.is_dir()):
             return one(file)[0]
@@ -164,12 +170,15 @@ class Batch:
         console(stderr=True).print("; ".join(parts))
 
 
-def _tell_skipped(file: Path, outputs: Outputs, report: dict[str, Any], as_json: bool) -> None:
-    """That a result is there; its report, as it would be printed had the work been done now."""
-    if as_json:
-        say_json({**report, "skipped": True})
-    else:
-        say(f"skipped {file}: {outputs.clip} is there already")
+def _by_report(verb: str) -> Earlier:
+    """Results of a verb that writes reports are known by these."""
+
+    def earlier(path: Path, options: dict[str, Any]) -> tuple[Path, dict[str, Any]] | None:
+        outputs = Outputs.choose(path, options.get("output"), verb, bool(options.get("player")))
+        report = outputs.earlier(verb)
+        return None if report is None else (outputs.clip, report)
+
+    return earlier
 
 
 def _empty(folder: Path) -> FileError:
