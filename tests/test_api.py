@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -156,6 +157,7 @@ def test_what_does_not_fit_is_said(cmu_walk):
         lambda clip: interpose.between(clip, [0, 30], "walk", method="spline"),
         lambda clip: interpose.forecast(clip, 10, samples=2, method="spline"),
         lambda clip: interpose.stitch([clip, clip], "many"),
+        lambda clip: interpose.fill(clip, method=5),
     ],
 )
 def test_advice_can_be_followed_in_python(cmu_walk, ask):
@@ -164,6 +166,48 @@ def test_advice_can_be_followed_in_python(cmu_walk, ask):
         ask(cmu_walk)
     assert error.value.fix
     assert "--" not in error.value.fix
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda clip: interpose.load(None), "path=None"),
+        (lambda clip: interpose.load(b"take.bvh"), "the path of a file"),
+        (lambda clip: interpose.save(clip, 5), "path=5"),
+        (lambda clip: interpose.fill(None, "20:30"), "clip=None"),
+        (lambda clip: interpose.fill([clip], "20:30"), "a clip, or the path of one"),
+        (lambda clip: interpose.fill(clip, "20:30", parts=5), "parts=5"),
+        (lambda clip: interpose.fill(clip, "20:30", pins=[1.5]), "a Pin, or several"),
+        (lambda clip: interpose.fill(clip, "20:30", path=[(1, 2)]), "points of the floor by frame"),
+        (lambda clip: interpose.fill(clip, "20:30", progress=True), "progress=True"),
+        (lambda clip: interpose.fill(clip, "20:30", method=["spline"]), "the name of a method"),
+        (lambda clip: interpose.recover(clip, 5), "names of joints"),
+        (lambda clip: interpose.recover(clip, "LeftArm", place="20:30"), "True or False"),
+        (lambda clip: interpose.scan(clip, "20:30"), "an Observation, or None"),
+        (lambda clip: interpose.between(clip, [0, 30], ["walk"]), "a text"),
+        (lambda clip: interpose.stitch(5), "clips, or paths of some"),
+        (lambda clip: interpose.stitch({"a": clip}), "clips, or paths of some"),
+        (lambda clip: interpose.retarget(clip, None), "like=None"),
+        (lambda clip: interpose.resample("take.bvh", 24), "interpose.load"),
+    ],
+)
+def test_arguments_of_another_kind_are_named(cmu_walk, ask, said):
+    with pytest.raises(interpose.RequestError) as error:
+        ask(cmu_walk)
+    assert said in str(error.value)
+    assert len(str(error.value).splitlines()) == 3
+
+
+def test_what_can_be_used_is_not_refused(cmu_walk):
+    """NumPy's numbers and switches, generators and arrays."""
+    done = interpose.stitch((clip for clip in [cmu_walk, cmu_walk]), np.array([20]), loop=np.bool_(False))
+    assert len(done.clip) == 2 * len(cmu_walk) + 20
+    done = interpose.between(cmu_walk, np.array([0, 30]), method="spline", pins=(), progress=None)
+    assert len(done.report.gaps) == 1
+    assert interpose.fill.__doc__
+    assert pickle.loads(pickle.dumps(interpose.fill)) is interpose.fill, "for pools of processes"
+    with pytest.raises(TypeError, match=r"fill\(\) got an unexpected keyword argument"):
+        interpose.fill(cmu_walk, gap="20:30")
 
 
 @pytest.mark.parametrize("gap", [slice(10, 20), 7, [slice(10, 20)]])

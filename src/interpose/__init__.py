@@ -17,6 +17,8 @@ from importlib import import_module
 from numbers import Real
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from interpose.arguments import checked
+
 if TYPE_CHECKING:
     from pathlib import Path
 
@@ -96,6 +98,7 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
 
 
+@checked
 def scan(clip: Clip | str | Path, observation: Observation | None = None) -> list[Finding]:
     """What looks missing in a clip, in order of time: frozen, broken and rest poses, and what `observation`
     says is unknown.
@@ -112,6 +115,7 @@ def scan(clip: Clip | str | Path, observation: Observation | None = None) -> lis
     return look(_clip(clip), observation)
 
 
+@checked
 def fill(
     clip: Clip | str | Path,
     gaps: AnyGap | Sequence[AnyGap] | Observation | None = None,
@@ -185,6 +189,7 @@ def fill(
     )
 
 
+@checked
 def recover(
     clip: Clip | str | Path,
     joints: str | Sequence[str] | None = None,
@@ -222,6 +227,7 @@ def recover(
     )
 
 
+@checked
 def denoise(
     clip: Clip | str | Path,
     strength: float = 1.0,
@@ -265,6 +271,7 @@ def denoise(
     )
 
 
+@checked
 def between(
     clip: Clip | str | Path,
     keys: Sequence[int],
@@ -295,6 +302,7 @@ def between(
     return tasks.between(_clip(clip), keys, action, method, seed, progress, path=path, pins=several)
 
 
+@checked
 def forecast(
     clip: Clip | str | Path,
     frames: int | None = None,
@@ -330,6 +338,7 @@ def forecast(
     return tasks.forecast(_clip(clip), frames, samples, method, seed, temperature, progress)
 
 
+@checked
 def cycle(clip: Clip | str | Path) -> Cycle:
     """The part of a motion that goes round best already: of a walk one stride or several.
 
@@ -349,6 +358,7 @@ def cycle(clip: Clip | str | Path) -> Cycle:
     return tasks.cycle(_clip(clip))
 
 
+@checked
 def stitch(
     clips: Clip | str | Path | Sequence[Clip | str | Path],
     frames: str | int | Sequence[int] = "auto",
@@ -396,6 +406,7 @@ def stitch(
     )
 
 
+@checked
 def retarget(clip: Clip | str | Path, like: Clip | str | Path) -> Clip:
     """The motion of one humanoid on the skeleton of another one.
 

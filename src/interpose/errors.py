@@ -67,6 +67,15 @@ def unknown(kind: str, name: object, choices: object) -> RequestError:
     )
 
 
+def unfit(name: str, value: object, kind: str) -> RequestError:
+    """The error for an argument of a wholly other kind than the one that it must be of."""
+    shown = repr(value)
+    shown = shown if len(shown) <= 60 else f"{shown[:57]}..."
+    a = "an" if type(value).__name__[0] in "aeiouAEIO" else "a"
+    why = "nothing was given" if value is None else f"it is {a} {type(value).__name__}"
+    return RequestError(f"cannot use {name}={shown}", why, f"Give {kind}.")
+
+
 def is_number(
     value: Any, least: float = -math.inf, most: float = math.inf, whole: bool = False
 ) -> TypeGuard[float]:

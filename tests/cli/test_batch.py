@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 from pathlib import Path
 
 import pytest
 
+from interpose.cli.outputs import Outputs
 from interpose.formats import load, save
 from interpose.methods.classical import ZeroVelocity
 
@@ -181,3 +183,143 @@ def test_linked_folders_are_looked_into_once(run, take):
     (kept / "round").symlink_to(folder)
     done = run("scan", "takes", "--json")
     assert [Path(one["input"]).parts for one in done.json] == [("takes", "linked", "a.bvh")]
+
+
+def test_a_batch_goes_on_where_it_stopped(run, takes, monkeypatch):
+    """The list, the code and the files are as if it had not been interrupted."""
+    (takes / "c.bvh").unlink()
+    for name in ("d.bvh", "e.bvh"):
+        shutil.copy(takes / "b.bvh", takes / name)
+    fill = ("fill", "takes", "--gap", "60:80", "--gap", "90:99", "--max-gap", "9", "--method", "spline")
+    asked = 0
+
+    def stopped(*_):  # type: ignore[no-untyped-def]
+        nonlocal asked
+        asked += 1
+        if asked == 3:
+            raise KeyboardInterrupt
+        return True
+
+    monkeypatch.setattr(Outputs, "told", stopped)
+    first = run(*fill)
+    assert first.code == 130
+    assert "interrupted before 2" in first.err
+    monkeypatch.undo()
+    monkeypatch.chdir(takes.parent)
+    before = {path: path.stat().st_mtime_ns for path in takes.glob("*.filled.*")}
+    assert len(before) == 6
+    (takes / "d.filled.bvh").unlink()  # as if it had not come so far
+    (takes / "d.filled.json").unlink()
+    again = run(*fill, "--skip-existing", "--json")
+    assert again.code == 4, "one gap of each stays open"
+    assert [one.get("skipped", False) for one in again.json] == [True, True, False, False]
+    assert [one["code"] for one in again.json] == [4] * 4
+    assert "2 skipped, as their results were there; 4 with something left open" in again.err
+    assert len([*takes.glob("*.filled.*")]) == 8
+    for name in ("a.filled.bvh", "b.filled.json"):
+        assert (takes / name).stat().st_mtime_ns == before[takes / name]
+    assert run("fill", "takes/a.bvh", "--gap", "60:80", "--skip-existing").code == 4
+
+
+def test_what_another_verb_or_nobody_knows_who_made_is_not_skipped(run, takes):
+    (takes / "c.bvh").unlink()
+    assert run("denoise", "takes", "-o", "done").code == 0
+    done = run("fill", "takes", "--gap", "60:80", "--method", "spline", "-o", "done", "--skip-existing")
+    assert done.code == 2
+    assert "the file exists already" in done.err
+    (takes.parent / "done" / "a.json").unlink()
+    assert run("denoise", "takes/a.bvh", "-o", "done", "--skip-existing").code == 2
+    refused = run("denoise", "takes", "-o", "done", "--skip-existing", "--force")
+    assert refused.code == 2
+    assert "--skip-existing does not go with --force" in refused.err
+
+
+def test_a_full_disk_leaves_no_half_of_a_result(run, takes, monkeypatch):
+    """Nor a clip without its report, which no later run would replace."""
+
+    def full(path, *_, **__):  # type: ignore[no-untyped-def]
+        path.touch()
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_text", full)
+    done = run("denoise", "takes/a.bvh")
+    assert done.code == 3
+    assert "a.denoised.json" in done.err
+    assert "No space left" in done.err
+    assert sorted(path.name for path in takes.iterdir()) == ["a.bvh", "b.bvh", "c.bvh", "notes.txt"]
+
+
+def test_a_long_name_is_no_hindrance(run, takes):
+    """255 bytes are what most file systems take, and 250 are needed here."""
+    name = "a" * 237
+    (takes / "a.bvh").rename(takes / f"{name}.bvh")
+    assert run("denoise", f"takes/{name}.bvh").code == 0
+    assert (takes / f"{name}.denoised.json").exists()
+
+
+@pytest.mark.skipif(os.name == "nt", reason="links need rights there")
+def test_a_linked_clip_keeps_no_other_from_its_result(run, takes):
+    (takes / "c.bvh").unlink()
+    (takes / "linked.bvh").symlink_to(takes / "a.bvh")
+    assert run("denoise", "takes", "takes/a.bvh", "-o", "done").code == 0
+    made = sorted(path.name for path in (takes.parent / "done").glob("*.bvh"))
+    assert made == ["a.bvh", "b.bvh", "linked.bvh"]
+
+
+def test_who_reads_along_may_stop(run, takes, monkeypatch):
+    def stopped(*_):  # type: ignore[no-untyped-def]
+        raise BrokenPipeError
+
+    monkeypatch.setattr("interpose.cli.scan.describe", stopped)
+    monkeypatch.setattr("interpose.cli.os.dup2", lambda *_: None)
+    monkeypatch.setattr("sys.stdout.fileno", lambda: 1, raising=False)
+    done = run("scan", "takes")
+    assert done.code == 0
+    assert "foreseen" not in done.err
+
+
+def test_two_processes_may_meet(run, takes, monkeypatch):
+    """What another one has written meanwhile is skipped, as what was there before."""
+    assert run("denoise", "takes/a.bvh", "-o", "other.bvh").code == 0
+    check = Outputs.check
+
+    def meanwhile(self, *given, **named):  # type: ignore[no-untyped-def]
+        for suffix in (".bvh", ".json"):
+            shutil.copy(takes.parent / f"other{suffix}", self.clip.with_suffix(suffix))
+        check(self, *given, **named)
+
+    monkeypatch.setattr(Outputs, "check", meanwhile)
+    assert run("denoise", "takes/a.bvh", "takes/b.bvh").code == 2
+    for made in takes.glob("*.denoised.*"):
+        made.unlink()
+    done = run("denoise", "takes/a.bvh", "takes/b.bvh", "--skip-existing")
+    assert done.code == 0
+    assert "2 of 2 files done; 2 skipped" in done.err
+
+
+def test_a_file_that_looks_like_an_option_is_one(run, takes):
+    (takes / "a.bvh").rename(takes.parent / "-a.bvh")
+    assert "Write ./-a.bvh for the file." in run("scan", "-a.bvh").err
+    assert run("scan", "./-a.bvh").code == 0
+
+
+def test_a_folder_is_converted_into_a_folder(run, takes):
+    (takes / "day").mkdir()
+    (takes / "b.bvh").rename(takes / "day" / "b.bvh")
+    done = run("convert", "takes", "half", "--fps", "15", "--drop-repeated")
+    assert done.code == 3, "one cannot be read"
+    assert "2 of 3 files done; 1 could not be done: takes/c.bvh" in done.err
+    made = takes.parent / "half"
+    assert sorted(str(path.relative_to(made)) for path in made.rglob("*.*")) == ["a.bvh", "day/b.bvh"]
+    assert load(made / "day" / "b.bvh").fps == 15
+    (takes / "c.bvh").unlink()
+    assert run("convert", "takes", "half").code == 2, "nothing is overwritten"
+    (made / "a.bvh").unlink()
+    again = run("convert", "takes", "half", "--fps", "15", "--skip-existing")
+    assert again.code == 0
+    assert "2 of 2 files done; 1 skipped" in again.err
+    assert run("convert", "takes", "other", "--to", "npz").code == 0
+    assert (takes.parent / "other" / "day" / "b.npz").exists()
+    assert run("convert", "takes/a.bvh", "other").code == 0, "one clip goes into a folder, too"
+    assert (takes.parent / "other" / "a.bvh").exists()
+    assert "does not apply to one file" in run("convert", "takes/a.bvh", "a.npz", "--to", "npz").err

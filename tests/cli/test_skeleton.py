@@ -75,7 +75,7 @@ def test_a_map_lets_the_network_fill_a_strange_skeleton_and_a_report_remembers_i
     assert run("skeleton", strange).code == 4
     plain = run("fill", strange, "--gap", "60:90", "--method", "cae", "--json", "-o", "plain.bvh")
     assert plain.json["gaps"][0]["method"] == "spline"
-    assert "--map names them" in json.dumps(plain.json)
+    assert "--map, or load(..., roles=...), names them" in json.dumps(plain.json)
 
     own = dict(zip(formats.load(rig).skeleton.names, formats.load(strange).skeleton.names))
     joints = run("skeleton", rig, "--json").json["mapping"]

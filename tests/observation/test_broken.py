@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from tests.skeletons.rigs import under_root
@@ -11,7 +13,7 @@ from interpose.evaluation.denoising import drop
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.observation import broken as module
-from interpose.observation.broken import _smoother, broken
+from interpose.observation.broken import BLOCK, _smoother, broken, medians
 from interpose.skeletons.carrier import hips_of
 
 
@@ -182,3 +184,15 @@ def test_what_snaps_again_and_again_is_lost_whatever_would_be_rougher(cmu_walk, 
     assert not found.rotation[:, walk.skeleton.index("LeftForeArm")].all()
     lost = ~found.rotation & (np.abs((dropped.rotation * walk.skeleton.rest_rotation).sum(-1)) > 1 - 1e-12)
     assert (~alone.rotation & lost).sum() > 0.99 * lost.sum() > 1000
+
+
+def test_medians_of_long_takes_need_little_room():
+    """And are the same where blocks meet."""
+    values = np.random.default_rng(0).normal(size=(5 * BLOCK, 2, 3))
+    tracemalloc.start()
+    whole = medians(values, 3, "edge")
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 10 * values.nbytes
+    meet = slice(BLOCK - 20, BLOCK + 20)
+    assert np.array_equal(whole[meet][3:-3], medians(values[meet], 3, "edge")[3:-3])

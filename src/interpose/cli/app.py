@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from pathlib import Path
 
 from cyclopts import (
     App,
@@ -65,6 +66,8 @@ def translate(error: CycloptsError) -> RequestError:
     if isinstance(error, UnknownOptionError):
         name = error.token.keyword or error.token.value
         known = [name for argument in error.argument_collection for name in argument.names if argument.parse]
+        if Path(name).exists():
+            return RequestError(f"unknown option: {name}", "it is a file", f"Write ./{name} for the file.")
         return RequestError(
             f"unknown option: {name}", f"{verb} has none of that name", _near(name, known) + see
         )

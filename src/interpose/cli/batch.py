@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import nullcontext, redirect_stdout
+from dataclasses import dataclass, field
 from functools import wraps
 from io import StringIO
 from pathlib import Path
@@ -15,29 +16,66 @@ from typing import Any
 
 from interpose.cli import Terminated, foreseen
 from interpose.cli.console import complain, console, say, say_json
-from interpose.cli.outputs import FOLDERS_MADE, MADE
-from interpose.errors import FileError, NothingError, RequestError
+from interpose.cli.outputs import FOLDERS_MADE, MADE, Outputs
+from interpose.errors import FileError, NothingError, RequestError, few
 
 MOTION = (".bvh", ".npz", ".amc")
 # take.filled.bvh and take.forecast.2.bvh lie beside the take.bvh that they were made of.
-PRODUCT = re.compile(rf"(.+)\.(?:{'|'.join(MADE)})(?:\.\d+)?")
+PRODUCT = re.compile(rf"(.+)\.(?:{'|'.join(MADE.values())})(?:\.\d+)?")
 
 
-def each(verb: Callable[..., int | None]) -> Callable[..., int]:
+SKIP_EXISTING = """
+        skip_existing: leave out clips whose result is there already with its report, whatever was asked for
+            then: a batch goes on where it stopped.
+    """
+
+
+# What an earlier run made of a clip, by the options of this one, and its report; None where it made nothing.
+Earlier = Callable[[Path, dict[str, Any]], "tuple[Path, dict[str, Any]] | None"]
+
+
+def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Callable[..., int]:
     """The verb of one file, for several and for folders: what cannot be done is said, and the next one is.
 
     Its exit code is the largest of those that could not be done, or else of all. With --json it prints one
-    list, an entry for each file.
+    list, an entry for each file. Verbs that write get --skip-existing, so that a batch can go on where it
+    stopped.
     """
 
     signature = inspect.signature(verb)
+    writes = "output" in signature.parameters
+    before = earlier or _by_report(verb.__name__)
 
     @wraps(verb)
-    def many(file: Path, /, *more: Path, **options: Any) -> int:
+    def many(file: Path, /, *more: Path, skip_existing: bool = False, **options: Any) -> int:
         folder: Path | None = options.get("output")
+        if skip_existing and options.get("force"):
+            why = "the one leaves alone what is there, the other replaces it"
+            raise RequestError("--skip-existing does not go with --force", why, "Leave one of them out.")
+
+        def one(path: Path) -> tuple[int, bool]:
+            """The exit code, and whether the result was there already."""
+            if not skip_existing:
+                return verb(path, **options) or 0, False
+            if (found := before(path, options)) is None:
+                try:
+                    return verb(path, **options) or 0, False
+                except RequestError:
+                    # Another process may have done it meanwhile.
+                    if (found := before(path, options)) is None:
+                        raise
+            made, report = found
+            if options.get("json"):
+                say_json({**report, "skipped": True})
+            else:
+                say(f"skipped {path}: {made} is there already")
+            return 4 if report.get("open") or report.get("left") else 0, True
+
         if not more and not file.is_dir() and (folder is None or not folder.is_dir()):
-            return verb(file, **options) or 0
-        found = {path.resolve(): (path, place) for path, place in clips((file, *more), folder)}
+            return one(file)[0]
+        # A link to a clip has a result of its own; a clip that is named twice, by way of a linked folder or
+        # not, has one.
+        found = {path.parent.resolve() / path.name: (path, at) for path, at in clips((file, *more), folder)}
         files = [path for path, _ in found.values()]
         if files == [file] and file.is_dir():
             raise _empty(file)
@@ -47,9 +85,9 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                 f"{len(files)} files are to be written",
                 "Name a folder; or leave it out: each lies beside what it was made of.",
             )
-        if "output" in signature.parameters:
+        if writes:
             _apart([(path, place if folder is not None else path) for path, place in found.values()])
-        codes, reports = [], []
+        batch = Batch(files, as_json=bool(options.get("json")))
         for path, place in found.values():
             said, made = StringIO(), FOLDERS_MADE.set(bool(options.get("dry_run")))
             try:
@@ -60,39 +98,87 @@ def each(verb: Callable[..., int | None]) -> Callable[..., int]:
                     if not options.get("dry_run"):
                         (folder / place).parent.mkdir(parents=True, exist_ok=True)
                 with redirect_stdout(said) if options.get("json") else nullcontext():
-                    codes.append(verb(path, **options) or 0)
-                reports.append(json.loads(said.getvalue() or "null"))
+                    code, skipped = one(path)
+                batch.add(code, json.loads(said.getvalue() or "null"), skipped=skipped)
             except NothingError as error:
-                reports.append({"input": str(path), "nothing": error.what, "left": error.left})
-                codes.append(error.code)
+                batch.add(error.code, {"input": str(path), "nothing": error.what, "left": error.left})
                 if not options.get("json"):
                     say(f"{error.what}, but {error.left}" if error.left else error.what)
             except (KeyboardInterrupt, Terminated):
-                if options.get("json"):
-                    say_json(reports)
+                batch.tell(interrupted=True)
+                raise
+            except BrokenPipeError:  # who reads along has had enough
                 raise
             except Exception as error:
                 told = foreseen(error)
-                said_of = {"error": told.what, "why": told.why, "fix": told.fix, "code": told.exit_code}
-                reports.append({"input": str(path), **said_of})
+                said_of = {"error": told.what, "why": told.why, "fix": told.fix}
+                batch.add(told.exit_code, {"input": str(path), **said_of})
                 complain(told)
-                codes.append(told.exit_code)
             finally:
                 FOLDERS_MADE.reset(made)
             if not options.get("json"):
                 say()
-        if options.get("json"):
-            say_json(reports)
-        done = sum(code == 0 for code in codes)
-        console(stderr=True).print(f"{done} of {len(files)} files done")
-        # What could not be done at all before what was left open in what was.
-        return max(codes, key=lambda code: (code not in (0, 4), code))
+        batch.tell()
+        return batch.code
 
     first, *rest = signature.parameters.values()
     others = inspect.Parameter("more", inspect.Parameter.VAR_POSITIONAL, annotation="Path")
-    many.__signature__ = signature.replace(parameters=[first, others, *rest])  # type: ignore[attr-defined]
+    added = [first, others, *rest]
     many.__annotations__ = {**verb.__annotations__, "more": "Path"}
+    if writes:
+        kind = inspect.Parameter.KEYWORD_ONLY
+        added.append(inspect.Parameter("skip_existing", kind, default=False, annotation="bool"))
+        many.__annotations__["skip_existing"] = "bool"
+        many.__doc__ = (verb.__doc__ or "").rstrip() + SKIP_EXISTING
+    many.__signature__ = signature.replace(parameters=added)  # type: ignore[attr-defined]
     return many
+
+
+@dataclass
+class Batch:
+    """What has become of the files of a batch, in their order: exit codes, and entries for --json."""
+
+    files: list[Path]
+    as_json: bool
+    codes: list[int] = field(default_factory=list)
+    entries: list[Any] = field(default_factory=list)
+    skipped: int = 0
+
+    def add(self, code: int, entry: Any, *, skipped: bool = False) -> None:
+        """The next file."""
+        self.codes.append(code)
+        self.entries.append({**entry, "code": code} if isinstance(entry, dict) else entry)
+        self.skipped += skipped
+
+    @property
+    def code(self) -> int:
+        """What could not be done at all comes before what was left open in what was."""
+        return max(self.codes, key=lambda code: (code not in (0, 4), code))
+
+    def tell(self, interrupted: bool = False) -> None:
+        """The list of --json, and the line that sums up, on stderr."""
+        if self.as_json:
+            say_json(self.entries)
+        parts = [f"{self.codes.count(0)} of {len(self.files)} files done"]
+        parts += [f"{self.skipped} skipped, as their results were there"] if self.skipped else []
+        idle = sum(isinstance(entry, dict) and "nothing" in entry for entry in self.entries)
+        parts += [f"{idle} with nothing to do"] if idle else []
+        parts += [f"{left} with something left open"] if (left := self.codes.count(4)) else []
+        failed = [str(file) for file, code in zip(self.files, self.codes) if code not in (0, 4)]
+        parts += [f"{len(failed)} could not be done: {few(failed)}"] if failed else []
+        parts += [f"interrupted before {len(self.files) - len(self.codes)}"] if interrupted else []
+        console(stderr=True).print("; ".join(parts))
+
+
+def _by_report(verb: str) -> Earlier:
+    """Results of a verb that writes reports are known by these."""
+
+    def earlier(path: Path, options: dict[str, Any]) -> tuple[Path, dict[str, Any]] | None:
+        outputs = Outputs.choose(path, options.get("output"), verb, bool(options.get("player")))
+        report = outputs.earlier(verb)
+        return None if report is None else (outputs.clip, report)
+
+    return earlier
 
 
 def _empty(folder: Path) -> FileError:

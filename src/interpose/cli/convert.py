@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
+from interpose.cli.batch import each
 from interpose.cli.console import names, say
 from interpose.cli.reading import Reading, describe
 from interpose.errors import NothingError, RequestError
@@ -23,13 +24,15 @@ def convert(
     output: Annotated[Path, Parameter(name="OUT")],
     /,
     *,
+    to: Literal["bvh", "npz", "amc"] | None = None,
     fps: float | None = None,
     onto: Path | None = None,
     drop_repeated: bool = False,
     force: bool = False,
+    skip_existing: bool = False,
     reading: Reading = Reading(),
-) -> None:
-    """Write a clip in another format, at another frame rate, or on another skeleton.
+) -> int:
+    """Write a clip, or all of a folder, in another format, at another frame rate, or on another skeleton.
 
     A file that becomes one of its format again keeps its layout and units, and at the same rate every
     number's text. Other BVH is written in centimetres, Y up. The suffix says the
@@ -41,23 +44,72 @@ def convert(
       interpose convert take.bvh take30.bvh --fps 30
       interpose convert take.bvh mine.bvh --onto rig.bvh
       interpose convert take.bvh take.even.bvh --drop-repeated
+      interpose convert takes/ mine/ --onto rig.bvh   (a whole folder)
 
     Args:
-        file: the clip to read.
-        output: the file to write.
+        file: the clip to read, or a folder of clips.
+        output: the file to write; of a folder a folder, in which each clip lies as it does in the other.
+        to: of folders: the format that clips are written in; their own without it.
         fps: frames a second of what is written.
         onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
             as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
         drop_repeated: take out whole frames that are the one before, as `interpose scan` finds them, and
             spread the others over the time: 24 frames a second in a file of 30 move evenly.
         force: replace an existing file.
+        skip_existing: of folders: leave out clips whose result is there already: a batch goes on where it
+            stopped.
     """
+    alone = not (file.is_dir() or output.is_dir())
+    if to is not None and alone:
+        raise RequestError(
+            "--to does not apply to one file", "the suffix of OUT says the format", "Leave it out."
+        )
+    each_of = each(_convert, earlier=_earlier)
+    return each_of(
+        file,
+        output=output,
+        to=to,
+        fps=fps,
+        onto=onto,
+        drop_repeated=drop_repeated,
+        alone=alone,
+        force=force,
+        skip_existing=skip_existing,
+        reading=reading,
+    )
+
+
+def _written(output: Path, to: str | None) -> Path:
+    return output if to is None else output.with_suffix(f".{to}")
+
+
+def _earlier(path: Path, options: dict[str, Any]) -> tuple[Path, dict[str, Any]] | None:
+    """What was converted before: there is no report of it."""
+    made = _written(options["output"], options["to"])
+    return (made, {}) if made.exists() else None
+
+
+def _convert(
+    file: Path,
+    /,
+    *,
+    output: Path,
+    to: str | None,
+    fps: float | None,
+    onto: Path | None,
+    drop_repeated: bool,
+    alone: bool,
+    force: bool,
+    reading: Reading,
+) -> None:
+    """One file; what makes no sense for one `alone` may be of some of a folder."""
     from interpose.finish import retarget
     from interpose.formats import save
     from interpose.geometry.time import resample, spread
     from interpose.observation.scan import repeats
     from interpose.observation.timeline import other_rig
 
+    output = _written(output, to)
     clip, rig = reading.load_all([file, onto or file])
     if output.exists() and (output.samefile(file) or output.samefile(onto or file)):
         raise RequestError(
@@ -73,16 +125,15 @@ def convert(
     made, said = clip, ""
     if drop_repeated:
         again = repeats(clip)
-        if not again.any():
+        if alone and not again.any():
             raise NothingError(
                 f"no frames of {file} are repeated",
                 "none, or too few to be more than chance, are the one before",
                 "Leave --drop-repeated out.",
             )
-        made, said = (
-            spread(clip, again),
-            f"; {again.sum()} were repeated, and what moved in steps moves evenly",
-        )
+        if again.any():
+            made = spread(clip, again)
+            said = f"; {again.sum()} were repeated, and what moved in steps moves evenly"
     kept = ""
     if onto is not None:
         made = retarget(made, rig)

@@ -66,7 +66,7 @@ def denoise(
     clip = reading.load(file)
     chosen = joints_of(joints, clip)
     part = range_of(frames, clip) if frames is not None else None
-    outputs = Outputs.choose(file, output, "denoised", player)
+    outputs = Outputs.choose(file, output, "denoise", player)
     if not dry_run:
         outputs.check(file, force)
     with progress(f"denoising {file.name}", len(clip)):

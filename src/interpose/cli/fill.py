@@ -142,7 +142,7 @@ def fill(
     lines += [
         f"{one.file} is on another rig: its motion was retargeted" for one in request.parts if one.retargeted
     ]
-    outputs = Outputs.choose(file, output, "filled", player)
+    outputs = Outputs.choose(file, output, "fill", player)
     if dry_run:
         return _dry_run(file, clip, request, points, pins, most, outputs, json, force, gaps)
     for read in (file, *(one.file for one in request.parts)):

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
 from interpose.cli.console import progress, say, say_json
-from interpose.cli.outputs import Outputs, licence, print_report, to_json, write_text
+from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
 
@@ -82,11 +81,9 @@ def forecast(
     report = to_json("forecast", file, clips[0], clip, done, seed, {}, more)
     page = _page(done, outputs.clip.name) if outputs.page else ""
     notes: dict[str, None] = {}
-    for path, sample in zip(clips, done.samples):
-        notes |= dict.fromkeys(save(sample.clip, path, force=force))
-    write_text(outputs.report, dumps(report, indent=2, allow_nan=False) + "\n")
-    if outputs.page:
-        write_text(outputs.page, page)
+    with beside(outputs, report, page):
+        for path, sample in zip(clips, done.samples):
+            notes |= dict.fromkeys(save(sample.clip, path, force=force))
     if json:
         say_json(report)
         return 0

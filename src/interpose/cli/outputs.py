@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from json import dumps, loads
@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from interpose import __version__
 from interpose.cli.console import figure, names, say, say_json, say_table, seconds
 from interpose.cli.reading import describe, details
-from interpose.errors import FileError, RequestError
+from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
@@ -43,7 +43,14 @@ UNITS = {
 
 
 # What verbs call what they make of take.bvh: take.filled.bvh and so on.
-MADE = ("between", "denoised", "filled", "forecast", "recovered", "stitched")
+MADE = {
+    "between": "between",
+    "denoise": "denoised",
+    "fill": "filled",
+    "forecast": "forecast",
+    "recover": "recovered",
+    "stitch": "stitched",
+}
 
 # Whether a folder that is not there yet will be: a dry run of many clips makes none.
 FOLDERS_MADE: ContextVar[bool] = ContextVar("FOLDERS_MADE", default=False)
@@ -58,14 +65,20 @@ class Outputs:
     page: Path | None
 
     @classmethod
-    def choose(cls, file: Path, output: Path | None, done: str, player: bool) -> Outputs:
+    def choose(cls, file: Path, output: Path | None, verb: str, player: bool) -> Outputs:
         """take.bvh to take.filled.bvh, take.filled.json, take.filled.html; `output` names another clip."""
-        clip = output or file.with_name(f"{file.stem}.{done}{file.suffix}")
+        clip = output or file.with_name(f"{file.stem}.{MADE[verb]}{file.suffix}")
         return cls(clip, clip.with_suffix(".json"), clip.with_suffix(".html") if player else None)
 
     @property
     def all(self) -> list[Path]:
         return [path for path in (self.clip, self.report, self.page) if path is not None]
+
+    def earlier(self, verb: str) -> dict[str, Any] | None:
+        """The report of an earlier run of the verb that left all of these files, or None."""
+        report = read_json(self.report)
+        whole = is_report(report) and report.get("verb") == verb and all(map(Path.exists, self.all))
+        return report if whole else None
 
     def told(self, dry_run: bool = False) -> str:
         """What was written, or would be."""
@@ -125,17 +138,24 @@ def is_report(content: Any) -> bool:
 
 def write_text(path: Path, text: str) -> None:
     """Write a file whole or not at all. Raises FileError when it cannot be written."""
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            part.write_text(text, encoding="utf-8")
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"cannot write {path}", error.strerror or str(error), "Choose another folder."
-        ) from None
+    from interpose.formats.whole import replacing
+
+    with replacing(path) as part:
+        part.write_text(text, encoding="utf-8")
+
+
+@contextmanager
+def beside(outputs: Outputs, report: dict[str, Any], page: str) -> Iterator[None]:
+    """Writes report and page, and lets the caller write the clip when there is room for them: if that fails,
+    all files stay as they were. A report comes last, so that it stands for a whole result."""
+    from interpose.formats.whole import replacing
+
+    texts = [(outputs.report, dumps(report, indent=2, allow_nan=False) + "\n")]
+    texts += [(outputs.page, page)] if outputs.page else []
+    with ExitStack() as stack:
+        for path, text in texts:
+            stack.enter_context(replacing(path)).write_text(text, encoding="utf-8")
+        yield
 
 
 def numbered(completion: Completion) -> list[tuple[int, Gap]]:
@@ -251,11 +271,8 @@ def write(
     from interpose.formats import save
 
     page = compare(clip, completion, outputs.clip.name) if outputs.page else ""
-    notes = save(completion.clip, outputs.clip, force=force)
-    write_text(outputs.report, dumps(report, indent=2, allow_nan=False) + "\n")
-    if outputs.page:
-        write_text(outputs.page, page)
-    return list(notes)
+    with beside(outputs, report, page):
+        return list(save(completion.clip, outputs.clip, force=force))
 
 
 def compare(clip: Clip, completion: Completion, title: str) -> str:

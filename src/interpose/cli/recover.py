@@ -56,8 +56,8 @@ def recover(
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
         more: further ones: each is done by itself.
         joints: the joints, separated by commas; without any, those that drop out.
-        place: where the body is, is lost, and how it is turned is known, as of suits that know no places:
-            feet that stand tell it. Without --frames it begins where the first frame is.
+        place: where the body is, is lost, and how it is turned is known, as of suits that know no places.
+            Feet that stand tell it. Without --frames it begins where the first frame is.
         frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
         output: where to write the clip; the report goes beside it. Of several clips a folder.
         method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
@@ -82,7 +82,7 @@ def recover(
     gap.check(len(clip))
     for name in chosen or ():
         clip.skeleton.index(name)
-    outputs = Outputs.choose(file, output, "recovered", player)
+    outputs = Outputs.choose(file, output, "recover", player)
     if not dry_run:
         outputs.check(file, force)
     with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:

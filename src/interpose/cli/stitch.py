@@ -110,7 +110,7 @@ def stitch(
     if trim:
         pieces, frames = _trimmed(pieces, loop, frames)
     first = pieces[0].file
-    outputs = Outputs.choose(first, output, "stitched", player)
+    outputs = Outputs.choose(first, output, "stitch", player)
     for piece in pieces:
         outputs.check(piece.file, force)
     clips = [piece.clip for piece in pieces]

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from interpose.clip import Clip
-from interpose.errors import FileError, RequestError
+from interpose.errors import FileError, RequestError, unfit
 from interpose.formats import asf_amc, bvh, npz
+from interpose.formats.whole import replacing
 
 __all__ = ["FORMATS", "Format", "held", "load", "save"]
 
@@ -61,7 +62,7 @@ def load(
         FileError: the file is missing, unreadable or damaged; the message says what to do.
         RequestError: the suffix or an option is wrong.
     """
-    path = Path(path)
+    path = _path(path)
     chosen = _format(path)
     if roles is not None and not isinstance(roles, Mapping):
         raise RequestError(
@@ -116,25 +117,16 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
     if not isinstance(clip, Clip):
         hint = "Give its .clip." if isinstance(getattr(clip, "clip", None), Clip) else "Give a clip."
         raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
-    path = Path(path)
+    path = _path(path)
     chosen = _format(path)
     if not len(clip):
         why = "the clip has no frames, and no file without any could be read again"
         raise RequestError(f"cannot write {path}", why, "Give a clip of one frame or more.")
     _check_free(path, force)
-    part = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        try:
-            with part.open("wb") as stream:
-                notes = chosen.write(clip, stream)
-            _check_free(path, force)
-            os.replace(part, path)
-        finally:
-            part.unlink(missing_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"cannot write {path}", error.strerror or str(error), "Choose another folder."
-        ) from None
+    with replacing(path) as part:
+        with part.open("wb") as stream:
+            notes = chosen.write(clip, stream)
+        _check_free(path, force)
     return (*notes, *_alone(path))
 
 
@@ -145,8 +137,15 @@ def _alone(path: Path) -> tuple[str, ...]:
     try:
         asf_amc.find_asf(path)
     except FileError:
-        return (f"{path.name} is read with its .asf file: put that beside it, or name it with --skeleton",)
+        where = "put that beside it, or name it with --skeleton (skeleton= in Python)"
+        return (f"{path.name} is read with its .asf file: {where}",)
     return ()
+
+
+def _path(path: object) -> Path:
+    if not isinstance(path, str | os.PathLike):
+        raise unfit("path", path, "the path of a file")
+    return Path(path)
 
 
 def _format(path: Path) -> Format:

@@ -93,7 +93,7 @@ def given_unit(unit: float | str | None) -> float | None:
 
 def given_up(up: str | None) -> str | None:
     """ "y", "z", "-y", ... from what the user gave."""
-    if up is not None and up.lower() not in _INSIDE:
+    if up is not None and not (isinstance(up, str) and up.lower() in _INSIDE):
         raise unknown("up axis", up, _INSIDE)
     return None if up is None else up.lower()
 
@@ -156,4 +156,6 @@ def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
         )
     up, second = sorted(doubts, key=lambda name: doubts[name])[:2]
     sure = doubts[second] - doubts[up] > UNSURE
-    return up, "estimated from the floor and the head" + ("" if sure else ", not surely: --up says it")
+    return up, "estimated from the floor and the head" + (
+        "" if sure else ", not surely: --up (up= in Python) says it"
+    )

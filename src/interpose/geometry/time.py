@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from array_api_compat import array_namespace
 
-from interpose.errors import RequestError, is_number
+from interpose.errors import RequestError, is_number, unfit
 from interpose.geometry import rotations
 
 if TYPE_CHECKING:
@@ -216,8 +216,10 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     translations linearly, or both with continuous velocities (`smooth`). Frames that fall on old ones are
     those, unchanged. The file's layout is dropped: it belongs to the old frames.
 
-    Raises RequestError when `fps` is no frame rate.
+    Raises RequestError for what is no clip, and when `fps` is no frame rate.
     """
+    if not hasattr(clip, "with_motion"):
+        raise unfit("clip", clip, "a clip: interpose.load reads one")
     check_rate(fps)
     if not len(clip):
         return replace(clip, fps=fps, source=None)

@@ -26,7 +26,8 @@ def no_humanoid(mapping: Mapping) -> str | None:
     if mapping.usable:
         return None
     lacking = ", ".join(mapping.lacking)
-    return f"it fills humanoids only, and no joints were found for {lacking} (--map names them)"
+    fix = "(--map, or load(..., roles=...), names them)"
+    return f"it fills humanoids only, and no joints were found for {lacking} {fix}"
 
 
 def observed_body(clip: Clip, observation: Observation) -> Humanoid:

@@ -194,7 +194,8 @@ def allowed(card: Card) -> Card:
         raise RequestError(
             f"the weights of {card.name} are not open",
             f"their licence: {card.licence}",
-            f"Use the method {' or '.join([*others, 'spline'])}, or allow any licence: --license any.",
+            f"Use the method {' or '.join([*others, 'spline'])}, or allow any licence: --license any, "
+            'or in Python none of license("open").',
         )
     return card
 

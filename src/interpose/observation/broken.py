@@ -49,6 +49,7 @@ NEARER, SLIGHT = 0.5, 0.02
 # second squared), was not lost.
 ROUGHER, ROUGH = 1.5, 20.0
 ROUNDS = 8  # in which a median is approached
+BLOCK = 4096  # frames
 
 
 def broken(clip: Clip) -> Observation:
@@ -270,10 +271,15 @@ def medians(values: np.ndarray, around: int, ends: str) -> np.ndarray:
     says how the first and last frames go on: "edge" or "reflect", as in `numpy.pad`.
     """
     padded = np.pad(values, [(around, around)] + [(0, 0)] * (values.ndim - 1), mode=ends)  # type: ignore[call-overload]
-    windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * around + 1, axis=0)
-    middle = windows.mean(axis=-1)
-    for _ in range(ROUNDS):
-        far = np.linalg.norm(windows - middle[..., None], axis=-2, keepdims=True)
-        weight = 1.0 / np.maximum(far, SAME)
-        middle = (weight * windows).sum(axis=-1) / weight.sum(axis=-1)
-    return np.asarray(middle)
+    middle = np.empty_like(values)
+    # In blocks: of ten minutes all windows at once would take half a gigabyte.
+    for start in range(0, len(values), BLOCK):
+        block = middle[start : start + BLOCK]
+        piece = padded[start : start + len(block) + 2 * around]
+        windows = np.lib.stride_tricks.sliding_window_view(piece, 2 * around + 1, axis=0)
+        block[:] = windows.mean(axis=-1)
+        for _ in range(ROUNDS):
+            far = np.linalg.norm(windows - block[..., None], axis=-2, keepdims=True)
+            weight = 1.0 / np.maximum(far, SAME)
+            block[:] = (weight * windows).sum(axis=-1) / weight.sum(axis=-1)
+    return middle

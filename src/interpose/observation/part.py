@@ -110,7 +110,7 @@ def _check(clip: Clip, observation: Observation, part: Part) -> None:
         raise RequestError(
             f"the frames {part.at}:{stop} do not lie in a gap",
             "joints of another clip can only be used where those of this one are missing",
-            "Move them (at, --at), take fewer of them (stop, --from-range), or make the gap longer.",
+            "Move them (--at, or at=), take fewer (--from-range, or stop=), or make the gap longer.",
         )
     if odd := misfits(clip, part):
         raise RequestError(

@@ -232,7 +232,7 @@ def joined(first: Clip, clips: list[Clip]) -> Clip:
 
 def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
     """The length of each gap, None where it is to be chosen."""
-    if frames == "auto":
+    if isinstance(frames, str) and frames == "auto":
         return [None] * gaps
     said: Any = [frames] * gaps if is_number(frames) else frames
     counts = isinstance(said, Sequence | np.ndarray) and not isinstance(said, str)

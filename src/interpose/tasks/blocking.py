@@ -64,7 +64,7 @@ def blocked(
         said = (f"{frames} frame{'s' * (frames > 1)}: {why}{later}",)
     bounded(frames, before.fps)
     if met > frames:
-        why = f"--target is frame {frames + 1}"
+        why = f"the last key is frame {frames + 1}"
         raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {frames}.")
     poses[frames + 1] = end
     near, laid = round(BESIDE * before.fps), block(poses)

@@ -54,7 +54,7 @@ def between(
         raise RequestError(
             "there is nothing between the keys",
             f"the keys are {', '.join(map(str, chosen)) or 'none'}",
-            "Name some that are apart: 0,30,75. Of a file of poses: --start a.bvh#0 --target a.bvh#1.",
+            "Name some that are apart: 0, 30, 75. Poses that follow each other: between --start, --target.",
         )
     zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
     done = fill(

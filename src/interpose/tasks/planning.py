@@ -48,7 +48,7 @@ def plan(
             raise RequestError(
                 f"there is no gap number {str(number)[:40]}",
                 f"the clip has {len(spans)} gaps, counted from 1 in order of time",
-                "A dry run (--dry-run) lists them, and so does report.gaps in Python.",
+                "A dry run (--dry-run) lists them; in Python report.gaps and report.open do.",
             )
     jobs = []
     for number, gap in enumerate(spans, 1):

@@ -71,7 +71,7 @@ def stitch(
     """
     clips = [on_rig_of(clip, clips[0]) if len(clip) else clip for clip in clips]
     line = timeline.lay(clips, frames, align, loop)
-    if frames == "auto" and align:
+    if isinstance(frames, str) and frames == "auto" and align:
         lengths, whys = _tried(line, method, action, seed)
         line = timeline.lay(clips, lengths, align, loop).because(whys)
     done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
@@ -122,7 +122,7 @@ def cycle(clip: Clip) -> Cycle:
         raise RequestError(
             f"no part of {clip.name or 'the clip'} goes round",
             "no pose of it is like one that was there half a second to eight seconds before",
-            "Loop all of it, without --trim: then a way back to the beginning is generated.",
+            "Loop all of it (without --trim, or cycle): then a way back to the beginning is generated.",
         )
     begin, end, apart = found
     bridge = min(max(2, round(BRIDGE * clip.fps)), end - begin - 2)

@@ -17,6 +17,7 @@ _COMMENT = re.compile(rb"(?<![^\s,()])#[^\r\n]*")
 _LINE = re.compile(rb"[^\r\n]+")
 _BLANKS = bytes.maketrans(b",()", b"   ")
 _AGAIN = "Correct that line, or export the clip again."
+_NAME = "Name the skeleton file (--skeleton FILE.asf; skeleton= in Python)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,14 +181,14 @@ def _first_frame(
         joint = joints.get(_name(words[0]).lower())
         if joint is None:
             why = f"{line}{asf.path.name} has no bone {name[:40]!r}"
-            raise FileError(what, why, "Name the skeleton file that belongs to it with --skeleton FILE.asf.")
+            raise FileError(what, why, f"{_NAME} that belongs to it.")
         if joint in seen:
             raise FileError(what, f"{line}{name} stands twice in one frame", _AGAIN)
         seen.add(joint)
         dof = asf.bones[joint].dof
         if len(words) - 1 != len(dof):
             said = f"{asf.path.name} gives it {len(dof)} ({' '.join(dof)})" if dof else "its skeleton none"
-            fix = "Correct that line, or name the skeleton file that belongs to it with --skeleton FILE.asf."
+            fix = f"Correct that line. Or: {_NAME} that belongs to it."
             raise FileError(what, f"{line}{name} has {len(words) - 1} numbers, {said}", fix)
         names[place] = words[0]
         place += len(words)
