@@ -149,6 +149,35 @@ def test_a_network_is_met_in_value_and_velocity(walk, speaking):
     assert off[60] > 0.025
 
 
+class Aside(Linear):
+    """Says rotations: the truth, but for an arm that is turned, and the whole body moved to the side."""
+
+    name = "aside"
+
+    def __init__(self, truth: Clip, turn: float, shift: float) -> None:
+        self.truth, self.turn, self.shift = truth, turn, shift
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        rotation, arm = self.truth.rotation.copy(), clip.skeleton.index("LeftArm")
+        off = rotations.about("Z", np.array(self.turn))
+        rotation[:, arm] = rotations.multiply(rotation[:, arm], off)
+        return Raw(clip.with_motion(rotation, self.truth.translation + np.array([self.shift, 0.0, 0.0])))
+
+
+def test_so_is_one_that_says_rotations(walk):
+    """The arm comes in the course of half a second, and is not torn aside in the first frame."""
+    done = complete(walk, gaps_of(walk, (30, 90)), Aside(walk, turn=0.2, shift=0.1))
+    [report] = done.report.gaps
+    assert report.method == "aside"
+    assert report.seam_after <= report.seam_limit
+    turned = rotations.angle(done.clip.rotation, walk.rotation)[:, walk.skeleton.index("LeftArm")]
+    off = np.linalg.norm(done.clip.root - walk.root, axis=-1)
+    for away, most in ((turned, 0.2), (off, 0.1)):
+        assert away[[30, 89]].max() < 0.02 * most
+        assert np.diff(away[30:60]).max() < 0.08 * most
+        assert away[60] == pytest.approx(most, rel=0.05)
+
+
 def test_a_lost_method_falls_back_by_name(walk, speaking):
     known = gaps_of(walk, (20, 30), (60, 90))
     method = speaking(walk, sigma=0.0)
@@ -215,6 +244,51 @@ def test_the_rest_pose_is_no_better_than_motion_that_jumps(walk):
         gap = complete(walk, seen, Trembling()).report.gaps[0]
         assert gap.method == method
         assert "the velocity jumps" in " ".join(gap.notes)
+
+
+class Waving(Linear):
+    """The left arm turns to and fro from frame to frame, by so many radians, inside of frames 60 to 89."""
+
+    def __init__(self, name: str, most: float) -> None:
+        self.name, self.most = name, most
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        raw = super().complete(clip, observation, seed)
+        frames, rotation = np.arange(60, 90), raw.clip.rotation.copy()
+        arm = clip.skeleton.index("LeftArm")
+        turn = rotations.about("Z", self.most * np.where(frames % 2, 1.0, -1.0))
+        rotation[frames, arm] = rotations.multiply(rotation[frames, arm], turn)
+        return Raw(raw.clip.with_motion(rotation, raw.clip.translation))
+
+
+@pytest.mark.parametrize(("share", "method"), [(0.6, "other"), (0.8, "other"), (0.96, "own"), (1.5, "own")])
+def test_a_simpler_method_takes_over_where_it_jumps_clearly_less(walk, share, method):
+    """Who falls jumps with either: then there is no reason to lose the motion."""
+    own, other = Waving("own", 0.2), Waving("other", 0.2 * share)
+    [gap] = complete(walk, gaps_of(walk, (60, 90)), own, fallback=other).report.gaps
+    assert gap.method == method
+
+
+class Sure(Linear):
+    """Where the body is 3 m away, and no foot stands, or all do."""
+
+    name = "sure"
+
+    def __init__(self, stands: float) -> None:
+        self.stands = stands
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        away = super().complete(clip, observation, seed).clip
+        away = away.with_motion(away.rotation, away.translation + 3.0)
+        return Raw(away, stands=np.full((len(clip), 4), self.stands))
+
+
+def test_what_a_method_says_of_feet_is_of_its_own_motion(walk):
+    """The simpler method's feet stand where that one has them."""
+    seen = gaps_of(walk, (40, 80))
+    done = [complete(walk, seen, Sure(stands)) for stands in (0.0, 1.0, np.nan)]
+    assert {one.report.gaps[0].method for one in done} == {"spline"}
+    assert len({bytes_of(one.clip) for one in done}) == 1
 
 
 class Kicking(Linear):

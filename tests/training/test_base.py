@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import copy
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 torch = pytest.importorskip("torch")
+onnx = pytest.importorskip("onnx")
 
 from interpose import tasks  # noqa: E402
 from interpose.errors import RequestError  # noqa: E402
@@ -81,6 +83,25 @@ def model():  # type: ignore[no-untyped-def]
     with torch.no_grad():
         made.encoder.say.weight.normal_(std=0.05)
     return made
+
+
+@pytest.fixture(scope="module")
+def graph(model, tmp_path_factory):  # type: ignore[no-untyped-def]
+    """The model as it is exported: what takes longer than all else here, so that one graph serves all."""
+    path = tmp_path_factory.mktemp("graph") / "small.onnx"
+    graphs.export_base_onnx(copy.deepcopy(model).float(), path)
+    return path
+
+
+@pytest.fixture
+def weights_alone(monkeypatch):  # type: ignore[no-untyped-def]
+    """Exports without graphs, for tests of what starts from weights, or of their cards."""
+
+    def write(model, path):  # type: ignore[no-untyped-def]
+        path.touch()
+        graphs.save_weights(model, path)
+
+    monkeypatch.setattr(export, "export_base_onnx", write)
 
 
 def test_sizes():
@@ -217,7 +238,7 @@ def test_packs_by_name(walk_pack):
         chosen(packs, "bandai")
 
 
-def test_clips_that_are_shorter_than_gaps_may_be(walk_pack, drawn, tmp_path):
+def test_clips_that_are_shorter_than_gaps_may_be(walk_pack, drawn, tmp_path, weights_alone):
     """As a user's own may all be: gaps are drawn that fit into them."""
     pack = walk_pack("lafan1", both=True)
     long_ones = BaseSettings(width=24, layers=1, batch=2, longest=2000, short=-8.0)
@@ -242,7 +263,7 @@ def trained(walk_pack, tmp_path_factory):  # type: ignore[no-untyped-def]
     return weights.load(folder / "weights", "small"), folder, told
 
 
-def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path):
+def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path, weights_alone):
     card, pack = trained[0], walk_pack("lafan1", both=True)
     settings = BaseSettings(width=24, layers=1, batch=4, longest=40, learning_rate=0.1)
     model = train_base([pack], tmp_path, Budget.parse("3steps"), settings, start=card, say=lambda line: None)
@@ -262,7 +283,7 @@ def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path):
 
 
 @pytest.fixture
-def tuned(trained, walk_pack, tmp_path_factory, monkeypatch):  # type: ignore[no-untyped-def]
+def tuned(trained, walk_pack, tmp_path_factory, weights_alone):  # type: ignore[no-untyped-def]
     """Makes runs on CMU's data alone that started from some weights: from the folder of one to its card."""
     settings = BaseSettings(datasets="cmu", batch=2, longest=40)
     packs = [walk_pack("cmu", both=True)]
@@ -271,9 +292,6 @@ def tuned(trained, walk_pack, tmp_path_factory, monkeypatch):  # type: ignore[no
         run = tmp_path_factory.mktemp("run")
         train_base(packs, run, Budget.parse("1steps"), settings, start=replace(trained[0], **start), say=str)
         return run, lambda **more: export_base(run, packs, run / "weights", ["train"], **more)
-
-    # What counts here is the card.
-    monkeypatch.setattr(export, "export_base_onnx", lambda model, path: path.touch())
 
     return make
 
@@ -343,7 +361,7 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
 
 
-def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
+def test_weights_beside_the_graph(model, graph, given, tmp_path, monkeypatch):
     """In 16 bits and in files that are not too large; training goes on from them, or else from the graph.
 
     A graph whose weights take several files reads them, instead of holding them once more.
@@ -353,7 +371,10 @@ def test_weights_beside_the_graph(model, given, tmp_path, monkeypatch):
         path = tmp_path / str(files) / "small.onnx"
         path.parent.mkdir()
         monkeypatch.setattr(graphs, "SHARD", size)
-        graphs.export_base_onnx(one, path)
+        for part in (graph, *shard_paths(graph)):
+            shutil.copy(part, path.parent)
+        if files > 1:
+            graphs.save_weights(one, path)
         shards = shard_paths(path)
         assert len(shards) == files
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
@@ -398,14 +419,15 @@ def of(path):  # type: ignore[no-untyped-def]
     return replace(card, path=path.with_suffix(".json"))
 
 
-def test_weights_that_are_asked_beside_others_count_to_their_share(model, given, tmp_path):
+def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given, tmp_path):
     """And an action that they do not know is none to them; what is known stays exactly."""
     cards = []
     for seed in (1, 2):
-        other = copy.deepcopy(model).float()
-        torch.manual_seed(seed)
-        torch.nn.init.normal_(other.encoder.label.weight, std=1.0)
-        graphs.export_base_onnx(other, tmp_path / f"{seed}.onnx")
+        other = onnx.load(graph)
+        (labels,) = (one for one in other.graph.initializer if one.name == "encoder.label.weight")
+        drawn = np.random.default_rng(seed).normal(size=labels.dims).astype(np.float32)
+        labels.CopyFrom(onnx.numpy_helper.from_array(drawn, labels.name))
+        onnx.save(other, tmp_path / f"{seed}.onnx")
         cards.append(of(tmp_path / f"{seed}.onnx"))
     one, two = cards[0], replace(cards[1], labels=["", "run"])
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
@@ -425,16 +447,14 @@ def test_weights_that_are_asked_beside_others_count_to_their_share(model, given,
     )
 
 
-def test_the_mirror_image_is_completed_as_the_mirror_image(model, given, tmp_path):
+def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
     """Also where the two disagree; what is known of half a pose stays exactly."""
-    path = tmp_path / "small.onnx"
-    graphs.export_base_onnx(copy.deepcopy(model).float(), path)
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
     known = known == 1
     known[12:20, 5:9] = True
     pins = pins.copy()
     pins[15, 17] = True
-    seen, card = method.Seen(local, root, known, ("walk", ""), bones, pinned, pins), of(path)
+    seen, card = method.Seen(local, root, known, ("walk", ""), bones, pinned, pins), of(graph)
     once, image = method.run(card, seen)[0], method.run(card, seen.mirrored())[0]
     assert np.abs(once.root - image.root * [-1, 1, 1]).max() > 1e-3  # by itself it is not
     for limit in (np.pi, 0.0):
@@ -526,7 +546,7 @@ def test_straight_lines_are_as_good_as_straight_lines(walk_pack):
     assert validate(plain, batch)["ratio15"] > 1.05
 
 
-def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path):
+def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path, weights_alone):
     pack = walk_pack("lafan1", both=True)
     wired = BaseSettings(width=24, layers=1, batch=2, longest=40, near=0, velocities=0, every_seconds=1e9)
     train_base([pack], tmp_path / "first", Budget.parse("1steps"), wired)
@@ -543,7 +563,7 @@ def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path):
     )
 
 
-def test_a_run_on_more_data_learns_their_labels_too(walk_pack, tmp_path):
+def test_a_run_on_more_data_learns_their_labels_too(walk_pack, tmp_path, weights_alone):
     tiny = BaseSettings(width=24, layers=1, batch=2, longest=40, labelled=1, every_seconds=1e9)
     packs = [walk_pack("lafan1", both=True)]
     train_base(packs, tmp_path / "first", Budget.parse("3steps"), tiny)
@@ -555,7 +575,7 @@ def test_a_run_on_more_data_learns_their_labels_too(walk_pack, tmp_path):
     assert model.encoder.label.weight[2].any()
 
 
-def test_a_run_for_a_wider_network_begins_with_the_one_it_starts_from(walk_pack, tmp_path):
+def test_a_run_for_a_wider_network_begins_with_the_one_it_starts_from(walk_pack, tmp_path, weights_alone):
     pack = walk_pack("lafan1", both=True)
     first = BaseSettings(width=24, layers=1, batch=2, longest=40, near=0, every_seconds=1e9)
     train_base([pack], tmp_path / "first", Budget.parse("1steps"), first)

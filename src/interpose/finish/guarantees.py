@@ -107,7 +107,10 @@ class _Work:
             if self.raw.positions is None:
                 opinion = anatomy.unspun(anatomy.straightened(opinion, known), known)
                 self.firm = anatomy.locked(hidden, known)
-                opinion = merge(opinion, hidden, self.firm)
+                # Its word on frames that are known as a whole stays: from there it is eased into the gap.
+                part = ~known.frames[:, None]
+                stays = Observation(self.firm.rotation & part, self.firm.translation & part)
+                opinion = merge(opinion, hidden, stays)
         self.opinion = held(opinion, self.clip.source)
         self.current = merge(self.opinion, hidden, known)
         limit = seams.limit(hidden, known) if ask.limit is None else ask.limit
