@@ -9,11 +9,11 @@ import pytest
 
 from interpose import tasks
 from interpose.errors import RequestError
-from interpose.finish import feet, pins, seams
+from interpose.finish import anatomy, feet, pins, seams
 from interpose.geometry import rotations
 from interpose.methods.base import pinned
 from interpose.observation import Gap, Observation, Pin
-from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons import JOINTS, find_humanoid, find_mapping
 from interpose.skeletons.humanoid import reflect
 
 GAP = Gap(70, 100)
@@ -257,3 +257,17 @@ def test_turns_past_half_a_turn_go_on_the_same_way(cmu_walk):
     done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip.kinematics()[0][75:96, head]
     assert rotations.angle(done[[0, 10, 20]], pin.orientation).max() < 1e-3
     assert np.degrees(rotations.angle(done[1:], done[:-1]).max()) < 10
+
+
+def test_a_leg_bends_as_a_knee_does_to_where_its_foot_is_pinned(cmu_walk):
+    """And the foot goes along as it is: its toe stayed behind, and shins turned round in the knee for it."""
+    body, turned = find_humanoid(cmu_walk), []
+    held = cmu_walk.positions()[80, cmu_walk.skeleton.index("LeftFoot")] + [0.1, 0.2, 0.0]
+    pin = Pin("LeftFoot", np.arange(80, 90), np.tile(held, (10, 1)))
+    for some in ((), (pin,)):
+        turned.append(body.rotations(tasks.fill(cmu_walk, [GAP], "small", pins=some).clip)[70:100])
+    twists = [anatomy.knees(one)[0][:, 0].max() for one in turned]
+    assert twists[1] < twists[0] + 8.0
+    foot = JOINTS.index("LeftFoot")
+    off = np.degrees(rotations.angle(turned[1][:, foot], turned[0][:, foot]))
+    assert off.max() < 16.0

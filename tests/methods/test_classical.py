@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation, Slerp
+from tests.skeletons.rigs import under_root
 
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations, time
@@ -248,3 +249,11 @@ def test_spline_on_a_real_walk(cmu_walk):
         for name in ("spline", "linear")
     )
     assert spline < 0.5 * linear
+
+
+def test_hips_below_a_root_go_as_a_root_does(cmu_walk):
+    """As MotionBuilder and game engines write them, Z up or not: eased on their way, not led straight on."""
+    below = under_root(cmu_walk, goes=False)
+    own, other = (fill("spline", clip, Gap(60, 120)).positions() for clip in (cmu_walk, below))
+    joints = [below.skeleton.index(name) for name in cmu_walk.skeleton.names]
+    np.testing.assert_allclose(other[:, joints], own, atol=1e-6)

@@ -15,6 +15,7 @@ from scipy.interpolate import PchipInterpolator
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError, is_number
 from interpose.finish import feet
+from interpose.finish.hinges import Hinges
 from interpose.finish.solve import BLOCK, refine, refine_steadily
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
@@ -25,6 +26,9 @@ from interpose.skeletons import find_mapping
 # How much the place of every other joint counts beside a pin, round by round: first all give way together,
 # then the pins alone decide; and how many times more those of feet do.
 SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
+# How many square metres a radian counts, beside another joint's place, by which a knee or an elbow turns
+# otherwise than it bends: thighs and upper arms turn instead. From 1 on elbows jump that a hand brings near.
+HINGED = 0.3
 # Seconds over which a joint slows down to a place that it is to hold while the body goes on.
 LEAD = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
@@ -196,26 +200,33 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) ->
     joints = tuple(dict.fromkeys([*body, *pinned]))
     start = clip.positions()
     wanted, off = start[:, joints].copy(), np.zeros((len(clip), len(joints)))
+    # A foot goes where its ankle does, or its toe.
+    along = {a: b for pair in feet.pairs(skeleton).tolist() for a, b in (pair, pair[::-1])}
     for pin, joint in zip(pins, pinned):
         change = _between(
             len(clip), np.asarray(pin.frames), pin.position - start[pin.frames, joint], edges, clip.fps
         )
         wanted[:, joints.index(joint)] += change
         off[:, joints.index(joint)] += np.abs(change).max(axis=1)
+        other = along.get(joint, joint)
+        if other not in pinned and other in joints:
+            wanted[:, joints.index(other)] += change
     moved = np.flatnonzero(off.max(axis=1) > 1e-6)
     if not moved.size:
         return clip
     rows = [joints.index(joint) for joint in pinned]
     heavy = [joints.index(joint) for joint in feet.ends(skeleton) if joint in joints]
-    done = clip
+    done, hinges = clip, Hinges.of(clip)
     if len(clip) <= TOGETHER:
-        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy)
+        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy, hinges)
     rotation, translation = done.rotation.copy(), done.translation.copy()
     for i in range(0, len(moved), BLOCK):
         at = moved[i : i + BLOCK]
         part = done.with_motion(done.rotation[at], done.translation[at])
         seen = Observation(known.rotation[at], known.translation[at])
-        rotation[at], translation[at] = _approach(part, seen, joints, wanted[at], rows, heavy)
+        rotation[at], translation[at] = _approach(
+            part, seen, joints, wanted[at], rows, heavy, hinges and hinges.at(at)
+        )
     return clip.with_motion(rotation, translation)
 
 
@@ -227,6 +238,7 @@ def _steadily(
     wanted: np.ndarray,
     rows: list[int],
     heavy: list[int],
+    hinges: Hinges | None,
 ) -> Clip:
     """The joints in `rows` near to where they are wanted (F, n, 3), not at `start`, all frames together.
 
@@ -240,7 +252,8 @@ def _steadily(
         weights[:, heavy] *= FEET
         weights[:, rows] = 1.0
         goal = start + step * (wanted - start)
-        led, done = refine_steadily(led, known, joints, goal, weights, done, STEADY * share / SHARES[0])
+        steady, bent = STEADY * share / SHARES[0], hinges and hinges.to(HINGED * share)
+        led, done = refine_steadily(led, known, joints, goal, weights, done, steady, bent)
     off = [np.linalg.norm(wanted[:, rows] - p[:, rows]).sum() for p in (start, led.positions()[:, joints])]
     return led if off[1] < off[0] else clip  # what is out of reach may swing
 
@@ -252,6 +265,7 @@ def _approach(
     wanted: np.ndarray,
     rows: list[int],
     heavy: list[int],
+    hinges: Hinges | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rotations and translations with which the joints in `rows` come to where they are wanted (F, n, 3).
 
@@ -273,7 +287,7 @@ def _approach(
         weights = np.full((len(clip), len(joints)), share)
         weights[:, heavy] *= FEET
         weights[:, rows] = 1.0
-        tried = refine(clip, known, joints, goal, weights)
+        tried = refine(clip, known, joints, goal, weights, hinges and hinges.to(HINGED * share))
         there = off(tried)
         nearer = np.linalg.norm(there, axis=-1).sum(axis=1) < far.sum(axis=1) - STILL
         left = np.where(nearer[:, None, None], there, left)

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.linalg import solveh_banded
 
 from interpose.clip import Clip, Skeleton
+from interpose.finish.hinges import Hinges
 from interpose.finish.windows import ramp
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.time import bending
@@ -216,14 +217,15 @@ def refine(
     joints: tuple[int, ...],
     positions: np.ndarray,
     weights: np.ndarray | None = None,
+    hinges: Hinges | None = None,
 ) -> Clip:
     """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
     this shares it out. Damping keeps what positions do not tell. `weights` (F, n) says how much each position
-    counts; default: all the same.
+    counts; default: all the same. `hinges` hold knees and elbows to how they bend.
     """
-    freedom = Freedom.of(clip, observation, joints)
+    freedom = Freedom.of(clip, observation, joints, hinges)
     for _ in range(STEPS):
         normal, towards, frame = freedom.normal(clip, positions, weights)
         normal += DAMPING * np.eye(normal.shape[2])
@@ -239,18 +241,19 @@ def refine_steadily(
     weights: np.ndarray,
     done: np.ndarray,
     steady: float,
+    hinges: Hinges | None = None,
 ) -> tuple[Clip, np.ndarray]:
     """As `refine`, of all frames together: what is done to the motion changes evenly over time.
 
     Args:
-        clip, observation, joints, positions, weights: as in `refine`.
+        clip, observation, joints, positions, weights, hinges: as in `refine`.
         done: (F, d) what has been done to the motion already, as it came from here; zeros (F, 1) at first.
         steady: how much the second differences of what is done count, squared, against metres squared.
 
     Returns:
         The clip, and what has been done to it by now.
     """
-    freedom = Freedom.of(clip, observation, joints)
+    freedom = Freedom.of(clip, observation, joints, hinges)
     frames, size = freedom.free.shape
     even = steady * bending(frames)
     for _ in range(STEPS):
@@ -283,6 +286,7 @@ class Freedom:
         free: (F, d) 1 where they may, three columns for each.
         above: (n, movable) 1 where the known joint hangs below the one that may turn.
         by_shift: (3 n, 3 carriers) how much a shift of each carrier along each axis moves each known joint.
+        hinges: what pulls knees and elbows back that turn otherwise than by bending.
     """
 
     known: list[int]
@@ -291,9 +295,12 @@ class Freedom:
     free: np.ndarray
     above: np.ndarray
     by_shift: np.ndarray
+    hinges: Hinges | None = None
 
     @classmethod
-    def of(cls, clip: Clip, observation: Observation, joints: tuple[int, ...]) -> Freedom:
+    def of(
+        cls, clip: Clip, observation: Observation, joints: tuple[int, ...], hinges: Hinges | None = None
+    ) -> Freedom:
         """Of what is not observed."""
         skeleton, known = clip.skeleton, list(joints)
         under = (skeleton.below & ~np.eye(len(skeleton), dtype=bool)).astype(float)
@@ -303,7 +310,7 @@ class Freedom:
         free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
         carried = skeleton.below[np.ix_(known, carriers)]
         by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
-        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift)
+        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, hinges)
 
     def normal(
         self, clip: Clip, positions: np.ndarray, weights: np.ndarray | None
@@ -321,7 +328,13 @@ class Freedom:
         miss = (positions - placed[:, self.known]).reshape(frames, -1, 1)
         heavy = 1.0 if weights is None else np.repeat(weights, 3, axis=1)[:, None]
         transposed = np.swapaxes(jacobian, 1, 2) * heavy
-        return transposed @ jacobian, transposed @ miss, turned
+        normal, towards = transposed @ jacobian, transposed @ miss
+        for joint, stiff, pull in self.hinges.pulls(clip, turned) if self.hinges else ():
+            if joint in self.movable:
+                at = slice(3 * self.movable.index(joint), 3 * self.movable.index(joint) + 3)
+                normal[:, at, at] += stiff
+                towards[:, at, 0] += pull
+        return normal, towards, turned
 
     def moved(self, clip: Clip, step: np.ndarray, turned: np.ndarray) -> Clip:
         """The clip a step (F, d) further; `turned` are its global rotations."""

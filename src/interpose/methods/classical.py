@@ -12,10 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations, time
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
+from interpose.skeletons.carrier import placed
 
 # Frames completed at once: bounds the memory that a long clip with everything missing takes.
 BLOCK = 4096
@@ -66,6 +67,14 @@ def _spans(known: np.ndarray, fps: float) -> Iterator[Span]:
         yield Span(missing[block], seen, gap[block], fps)
 
 
+def _above(skeleton: Skeleton, rotation: np.ndarray, joint: int) -> np.ndarray:
+    """(4,) how all that a joint hangs from is turned, by local rotations (J, 4)."""
+    turned = rotations.identity()
+    for above in skeleton.ancestors(joint):
+        turned = rotations.multiply(rotation[above], turned)
+    return turned
+
+
 Fill = Callable[[np.ndarray, Span], np.ndarray]
 Way = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -101,14 +110,22 @@ class _Classical:
         )
         translation = np.empty_like(clip.translation)
         roots = np.array([skeleton.parents[joint] < 0 for joint in moved])
-        for part, fill in ((roots, self.positions), (~roots, self.offsets)):
-            rest = np.where(roots[part, None], 0.0, skeleton.rest_translation[moved][part])
+        rest = np.where(roots[:, None], 0.0, skeleton.rest_translation[moved])
+        # Hips below a reference, or below a root on the floor, go as a root does: seen with Y up.
+        carry = np.isin(moved, placed(clip))
+        axes = np.tile([1.0, 0.0, 0.0, 0.0], (len(moved), 1))
+        for slot in np.flatnonzero(carry & ~roots):
+            axes[slot] = _above(skeleton, rotation[0], moved[slot])
+        for part, fill in ((carry, self.positions), (~carry, self.offsets)):
             known = observation.translation[:, moved][:, part]
-            translation[:, part] = _complete(clip.translation[:, part], known, rest, clip.fps, fill)
+            some = rotations.rotate(axes[part], clip.translation[:, part])
+            done = _complete(some, known, rotations.rotate(axes, rest)[part], clip.fps, fill)
+            done = rotations.rotate(rotations.conjugate(axes[part]), done)
+            translation[:, part] = np.where(known[..., None], clip.translation[:, part], done)
         return Raw(clip.with_motion(rotation, translation))
 
     def positions(self, values: np.ndarray, span: Span) -> np.ndarray:
-        """Global positions of roots (F, n, 3) at the frames of a span."""
+        """Positions (F, n, 3), Y up, of what carries the body, at the frames of a span."""
         raise NotImplementedError
 
     def offsets(self, values: np.ndarray, span: Span) -> np.ndarray:
