@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import interpose
+from interpose.errors import NothingError
 from interpose.finish import Provenance
 from interpose.geometry import rotations
 
@@ -335,3 +336,22 @@ def test_who_stands_before_and_after_may_walk_in_between(cmu_walk):
 def _ahead(clip):  # type: ignore[no-untyped-def]
     way = clip.root[-1] - clip.root[0]
     return way[[0, 2]] / np.linalg.norm(way[[0, 2]])
+
+
+def test_results_go_from_process_to_process(data, tmp_path):
+    """A pool of processes gives back whole results, and a Forecast is one as well."""
+    path = data / "cmu_walk.bvh"
+    done = interpose.fill(path, "20:30", method="spline")
+    got = pickle.loads(pickle.dumps(done))
+    assert np.array_equal(got.raw.clip.rotation, done.raw.clip.rotation)
+    assert str(got.report) == str(done.report)
+    for one, name in ((done, "a.bvh"), (got, "b.bvh")):
+        interpose.save(one.clip, tmp_path / name)
+    assert (tmp_path / "a.bvh").read_bytes() == (tmp_path / "b.bvh").read_bytes()
+    ahead = pickle.loads(pickle.dumps(interpose.forecast(path, 5, method="spline")))
+    assert len(ahead.clip) - ahead.start == 5
+    for error in (
+        interpose.FileError("what", "why", "fix"),
+        NothingError("what", "why", "fix", "left", 4),
+    ):
+        assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
