@@ -190,6 +190,12 @@ def test_advice_can_be_followed_in_python(cmu_walk, ask):
         (lambda clip: interpose.stitch({"a": clip}), "clips, or paths of some"),
         (lambda clip: interpose.retarget(clip, None), "like=None"),
         (lambda clip: interpose.resample("take.bvh", 24), "interpose.load"),
+        (lambda clip: interpose.Gap(1, 5, 7), "joints=7"),
+        (lambda clip: interpose.Gap.parse((1, 5)), "gap=(1, 5)"),
+        (lambda clip: interpose.Part("wave.bvh", 0, 5, 22, ["LeftArm"]), "clip='wave.bvh'"),
+        (lambda clip: interpose.Part(clip, 0, 5, 22, None), "joints=None"),
+        (lambda clip: interpose.Observation.from_gaps(clip, "20:30"), "a list of Gaps"),
+        (lambda clip: interpose.Observation.from_gaps(clip, [(20, 30)]), "a Gap, such as"),
     ],
 )
 def test_arguments_of_another_kind_are_named(cmu_walk, ask, said):
