@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import shutil
 from pathlib import Path
@@ -301,6 +302,15 @@ def test_a_file_that_looks_like_an_option_is_one(run, takes):
     (takes / "a.bvh").rename(takes.parent / "-a.bvh")
     assert "Write ./-a.bvh for the file." in run("scan", "-a.bvh").err
     assert run("scan", "./-a.bvh").code == 0
+
+
+def test_a_log_in_a_narrow_encoding_takes_any_name(run, takes, monkeypatch):
+    (takes / "a.bvh").rename(takes / "\u65e5\u672c \u00fc.bvh")
+    log = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
+    monkeypatch.setattr("sys.stdout", log)
+    done = run("denoise", "takes/\u65e5\u672c \u00fc.bvh")
+    assert done.code == 0
+    assert b"\\u65e5\\u672c \xfc.denoised.bvh" in log.buffer.getvalue()  # type: ignore[attr-defined]
 
 
 def test_a_folder_is_converted_into_a_folder(run, takes):
