@@ -333,3 +333,17 @@ def test_a_folder_is_converted_into_a_folder(run, takes):
     assert run("convert", "takes/a.bvh", "other").code == 0, "one clip goes into a folder, too"
     assert (takes.parent / "other" / "a.bvh").exists()
     assert "does not apply to one file" in run("convert", "takes/a.bvh", "a.npz", "--to", "npz").err
+
+
+def test_what_a_batch_has_made_is_not_taken_for_more(run, takes):
+    """As takes/*.bvh names it when the batch goes on."""
+    (takes / "c.bvh").unlink()
+    for _ in range(2):
+        named = sorted(takes.glob("*.bvh"))
+        assert run("denoise", *named, "--skip-existing").code == 0
+    assert sorted(path.name for path in takes.glob("*.bvh")) == [
+        "a.bvh",
+        "a.denoised.bvh",
+        "b.bvh",
+        "b.denoised.bvh",
+    ]
