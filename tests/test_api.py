@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import interpose
+from interpose.errors import NothingError
 from interpose.finish import Provenance
 from interpose.geometry import rotations
 
@@ -189,6 +190,12 @@ def test_advice_can_be_followed_in_python(cmu_walk, ask):
         (lambda clip: interpose.stitch({"a": clip}), "clips, or paths of some"),
         (lambda clip: interpose.retarget(clip, None), "like=None"),
         (lambda clip: interpose.resample("take.bvh", 24), "interpose.load"),
+        (lambda clip: interpose.Gap(1, 5, 7), "joints=7"),
+        (lambda clip: interpose.Gap.parse((1, 5)), "gap=(1, 5)"),
+        (lambda clip: interpose.Part("wave.bvh", 0, 5, 22, ["LeftArm"]), "clip='wave.bvh'"),
+        (lambda clip: interpose.Part(clip, 0, 5, 22, None), "joints=None"),
+        (lambda clip: interpose.Observation.from_gaps(clip, "20:30"), "a list of Gaps"),
+        (lambda clip: interpose.Observation.from_gaps(clip, [(20, 30)]), "a Gap, such as"),
     ],
 )
 def test_arguments_of_another_kind_are_named(cmu_walk, ask, said):
@@ -335,3 +342,22 @@ def test_who_stands_before_and_after_may_walk_in_between(cmu_walk):
 def _ahead(clip):  # type: ignore[no-untyped-def]
     way = clip.root[-1] - clip.root[0]
     return way[[0, 2]] / np.linalg.norm(way[[0, 2]])
+
+
+def test_results_go_from_process_to_process(data, tmp_path):
+    """A pool of processes gives back whole results, and a Forecast is one as well."""
+    path = data / "cmu_walk.bvh"
+    done = interpose.fill(path, "20:30", method="spline")
+    got = pickle.loads(pickle.dumps(done))
+    assert np.array_equal(got.raw.clip.rotation, done.raw.clip.rotation)
+    assert str(got.report) == str(done.report)
+    for one, name in ((done, "a.bvh"), (got, "b.bvh")):
+        interpose.save(one.clip, tmp_path / name)
+    assert (tmp_path / "a.bvh").read_bytes() == (tmp_path / "b.bvh").read_bytes()
+    ahead = pickle.loads(pickle.dumps(interpose.forecast(path, 5, method="spline")))
+    assert len(ahead.clip) - ahead.start == 5
+    for error in (
+        interpose.FileError("what", "why", "fix"),
+        NothingError("what", "why", "fix", "left", 4),
+    ):
+        assert vars(pickle.loads(pickle.dumps(error))) == vars(error)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
     from interpose.clip import Clip, Skeleton
-    from interpose.errors import FileError, InterposeError, RequestError
+    from interpose.errors import FileError, InterposeError, NothingError, RequestError
     from interpose.finish import Completion
     from interpose.formats import load, save
     from interpose.geometry.time import resample
@@ -41,6 +41,7 @@ __all__ = [
     "FileError",
     "Gap",
     "InterposeError",
+    "NothingError",
     "Observation",
     "Part",
     "Pin",
@@ -70,6 +71,7 @@ _HOMES = {
     "FileError": "interpose.errors",
     "Gap": "interpose.observation",
     "InterposeError": "interpose.errors",
+    "NothingError": "interpose.errors",
     "Observation": "interpose.observation",
     "Part": "interpose.observation",
     "Pin": "interpose.observation",
@@ -152,11 +154,12 @@ def fill(
         `.provenance`.
 
     Raises:
-        RequestError: nothing to fill, or a range, joint, number or method that does not exist.
+        NothingError: no gaps were given, and a scan finds none.
+        RequestError: a range, joint, number or method that does not exist.
         FileError: the file cannot be read.
     """
     from interpose import tasks
-    from interpose.errors import RequestError
+    from interpose.errors import NothingError
     from interpose.observation import Observation, Part, Pin
     from interpose.observation.scan import to_gaps
 
@@ -167,7 +170,7 @@ def fill(
         if not wanted:
             others = sorted({one.kind for one in found})
             but = f" but what is {', '.join(others)}, as scan(clip) says" if others else ""
-            raise RequestError(
+            raise NothingError(
                 "nothing to fill",
                 f"no gaps were given, and a scan finds nothing missing{but}",
                 'Give gaps="120:160".',

@@ -29,14 +29,14 @@ class RequestError(InterposeError):
 
 
 class NothingError(RequestError):
-    """There is nothing to do: no fault among several clips.
+    """There is nothing to do, which is no fault where one clip of many needs nothing.
 
     Args:
         left: what is missing there and is another verb's, if anything is.
         code: with which exit code one of several clips ends so.
     """
 
-    def __init__(self, what: str, why: str, fix: str, left: str = "", code: int = 0) -> None:
+    def __init__(self, what: str, why: str = "", fix: str = "", left: str = "", code: int = 0) -> None:
         super().__init__(what, why, fix)
         self.left, self.code = left, code
 

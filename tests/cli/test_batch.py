@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import os
 import shutil
 from pathlib import Path
@@ -303,6 +304,15 @@ def test_a_file_that_looks_like_an_option_is_one(run, takes):
     assert run("scan", "./-a.bvh").code == 0
 
 
+def test_a_log_in_a_narrow_encoding_takes_any_name(run, takes, monkeypatch):
+    (takes / "a.bvh").rename(takes / "\u65e5\u672c \u00fc.bvh")
+    log = io.TextIOWrapper(io.BytesIO(), encoding="cp1252")
+    monkeypatch.setattr("sys.stdout", log)
+    done = run("denoise", "takes/\u65e5\u672c \u00fc.bvh")
+    assert done.code == 0
+    assert b"\\u65e5\\u672c \xfc.denoised.bvh" in log.buffer.getvalue()  # type: ignore[attr-defined]
+
+
 def test_a_folder_is_converted_into_a_folder(run, takes):
     (takes / "day").mkdir()
     (takes / "b.bvh").rename(takes / "day" / "b.bvh")
@@ -323,3 +333,17 @@ def test_a_folder_is_converted_into_a_folder(run, takes):
     assert run("convert", "takes/a.bvh", "other").code == 0, "one clip goes into a folder, too"
     assert (takes.parent / "other" / "a.bvh").exists()
     assert "does not apply to one file" in run("convert", "takes/a.bvh", "a.npz", "--to", "npz").err
+
+
+def test_what_a_batch_has_made_is_not_taken_for_more(run, takes):
+    """As takes/*.bvh names it when the batch goes on."""
+    (takes / "c.bvh").unlink()
+    for _ in range(2):
+        named = sorted(takes.glob("*.bvh"))
+        assert run("denoise", *named, "--skip-existing").code == 0
+    assert sorted(path.name for path in takes.glob("*.bvh")) == [
+        "a.bvh",
+        "a.denoised.bvh",
+        "b.bvh",
+        "b.denoised.bvh",
+    ]

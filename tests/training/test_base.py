@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import json
+import logging
 import shutil
 from dataclasses import replace
 
@@ -359,6 +360,16 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
+
+
+def test_exports_name_no_packages_that_are_not_needed(tmp_path, caplog):
+    """PyTorch's exporter looks for torchvision, and says so to whoever trains on their own clips."""
+    size = {0: torch.export.Dim("frames", min=2, max=9)}
+    with caplog.at_level(logging.NOTSET, logger="torch.onnx"):
+        graphs._write_graph(
+            torch.nn.Linear(2, 2), {"x": (torch.ones(3, 2), size)}, ["y"], tmp_path / "a.onnx"
+        )
+        assert not [one for one in caplog.records if one.name.startswith("torch.onnx")]
 
 
 def test_weights_beside_the_graph(model, graph, given, tmp_path, monkeypatch):

@@ -6,6 +6,7 @@ Exit codes: 0 done, 1 a fault of the program, 2 wrong usage, 3 unreadable input,
 
 from __future__ import annotations
 
+import io
 import os
 import signal
 import sys
@@ -85,6 +86,10 @@ def main(tokens: Sequence[str] | None = None) -> int:
     tokens = list(sys.argv[1:] if tokens is None else tokens)
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
+    # A log in a narrow encoding, as on Windows, takes any file's name; without this a result that is written
+    # ended as a fault.
+    if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         with _heeding_termination():
             code = _run(tokens, debug)

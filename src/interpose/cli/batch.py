@@ -76,6 +76,14 @@ def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Cal
         # A link to a clip has a result of its own; a clip that is named twice, by way of a linked folder or
         # not, has one.
         found = {path.parent.resolve() / path.name: (path, at) for path, at in clips((file, *more), folder)}
+        if skip_existing:
+            # takes/*.bvh names what a run before has made as well.
+            own = f".{MADE.get(verb.__name__)}"
+            found = {
+                at: one
+                for at, one in found.items()
+                if not (at.stem.endswith(own) and at.with_name(at.stem[: -len(own)] + at.suffix) in found)
+            }
         files = [path for path, _ in found.values()]
         if files == [file] and file.is_dir():
             raise _empty(file)

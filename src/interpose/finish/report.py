@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from enum import IntEnum
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -258,6 +258,14 @@ class Completion:
     def raw(self) -> Raw:
         """What the method itself said, before anything was corrected (what papers' tables use)."""
         return self.said()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What goes from process to process: `raw` is put together before."""
+        return {**self.__dict__, "said": partial(_given, self.raw)}
+
+
+def _given(raw: Raw) -> Raw:
+    return raw
 
 
 def _plain(value: Any) -> Any:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import RequestError, is_number
+from interpose.errors import RequestError, is_number, unfit
 
 
 def frame_number(value: object) -> int:
@@ -37,8 +38,7 @@ class Gap:
         for side in ("start", "stop"):
             object.__setattr__(self, side, frame_number(getattr(self, side)))
         if self.joints is not None:
-            joints = (self.joints,) if isinstance(self.joints, str) else tuple(self.joints)
-            object.__setattr__(self, "joints", joints)
+            object.__setattr__(self, "joints", joint_names(self.joints))
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -52,6 +52,8 @@ class Gap:
 
         Of a clip also from seconds, "4s:5.3s", and without one of its ends: "120:" is open to the clip's end.
         """
+        if not isinstance(text, str):
+            raise unfit("gap", text, 'a text, such as "120:160"')
         first, colon, last = text.strip().partition(":")
 
         try:
@@ -78,6 +80,15 @@ class Gap:
                 f"the gap {self.start}:{self.stop} reaches outside the clip", f"it has {frames} frames", fix
             )
         return self
+
+
+def joint_names(joints: Any) -> tuple[str, ...]:
+    """Names of joints, of one alone, too."""
+    if isinstance(joints, str):
+        return (joints,)
+    if not isinstance(joints, Iterable):
+        raise unfit("joints", joints, 'names of joints, such as ["LeftArm"]')
+    return tuple(joints)
 
 
 def frame_at(text: str, fps: float) -> int:
@@ -179,7 +190,11 @@ class Observation:
     def from_gaps(cls, clip: Clip, gaps: Iterable[Gap]) -> Observation:
         """Everything is known but the gaps. Raises RequestError for ranges or joints that are not there."""
         seen = cls.full(clip)
+        if not isinstance(gaps, Iterable) or isinstance(gaps, str):
+            raise unfit("gaps", gaps, 'a list of Gaps, such as [Gap.parse("120:160")]')
         for gap in gaps:
+            if not isinstance(gap, Gap):
+                raise unfit("gap", gap, 'a Gap, such as Gap.parse("120:160")')
             gap.check(len(clip))
             frames = slice(gap.start, gap.stop)
             if gap.joints is None:

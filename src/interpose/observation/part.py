@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, unfit
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP
-from interpose.observation.observation import Observation, frame_number
+from interpose.observation.observation import Observation, frame_number, joint_names
 from interpose.skeletons.carrier import hips_of
 
 SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
@@ -39,7 +39,9 @@ class Part:
         fill = object.__setattr__
         for side in ("start", "stop", "at"):
             fill(self, side, frame_number(getattr(self, side)))
-        fill(self, "joints", (self.joints,) if isinstance(self.joints, str) else tuple(self.joints))
+        fill(self, "joints", joint_names(self.joints))
+        if not isinstance(self.clip, Clip):
+            raise unfit("clip", self.clip, "a clip: interpose.load reads one")
 
 
 def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Clip, Observation]:

@@ -122,6 +122,8 @@ def _write_graph(
     Weights are stored in 16 bits and widened when the graph is loaded; all computing is in 32 bits. Linear
     layers whose weights are named in `eight` have 8 bits and compute in 8, on what is scaled as it comes.
     """
+    # Of other packages, which are not needed, it says that they are not there.
+    logging.getLogger("torch.onnx").setLevel(logging.ERROR)
     # The exporter stumbles over the memory layout of fused attention with a bias.
     with sdpa_kernel(SDPBackend.MATH):
         program = torch.onnx.export(
