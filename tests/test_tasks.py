@@ -7,6 +7,7 @@ import sys
 import textwrap
 from dataclasses import replace
 from importlib import resources
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,8 @@ from interpose.methods import registry, weights
 from interpose.observation import Gap, Observation, timeline
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
-from interpose.tasks import filling, windows
+from interpose.tasks import filling, stitching, windows
+from interpose.tasks.blocking import blocked
 
 METHODS = (*registry.names(), "auto")
 
@@ -93,7 +95,7 @@ def test_gaps_do_not_depend_on_each_other_s_filling(long_walk):
 
 
 def test_near_gaps_are_completed_at_once(cmu_walk, monkeypatch):
-    """Else each would complete all of its neighbours once more: keys on fives take 20 times as long."""
+    """Else each would complete all of its neighbours once more: keys on fives take 10 times as long."""
     asked, real = [], complete
 
     def counted(*args, **options):  # type: ignore[no-untyped-def]
@@ -101,7 +103,7 @@ def test_near_gaps_are_completed_at_once(cmu_walk, monkeypatch):
         return asked[-1]
 
     monkeypatch.setattr(filling, "complete", counted)
-    gaps = [Gap(frame + 1, frame + 5) for frame in range(0, 200, 5)]
+    gaps = [Gap(frame + 1, frame + 5) for frame in range(0, 100, 5)]
     done = tasks.fill(cmu_walk, gaps, "linear", methods={7: "spline"})
     assert sum(len(one.report.gaps) for one in asked) < 3 * len(gaps)
     assert [(gap.number, gap.start, gap.stop) for gap in done.report.gaps] == [
@@ -344,6 +346,47 @@ def test_half_an_hour_takes_less_than_a_gigabyte(data):
         [sys.executable, "-c", textwrap.dedent(program)], capture_output=True, text=True, check=True
     )
     assert int(done.stdout) < 1_000_000, "kilobytes"
+
+
+@pytest.mark.parametrize(
+    ("slides", "glides", "travels", "longer"),
+    [
+        ((20.0, 11.0), (0.0, 0.15), (1.0, 1.0), True),
+        ((20.0, 11.0), (0.0, 0.22), (1.0, 1.0), False),
+        ((20.0, 11.0), (0.0, None), (1.0, 0.3), True),
+        ((20.0, 11.0), (0.0, None), (1.0, 0.1), False),
+    ],
+)
+def test_a_transition_takes_longer_where_feet_slide_less(
+    cmu_walk, data, monkeypatch, slides, glides, travels, longer
+):
+    """Gliding all along counts as 50 cm/s; feet that do not travel tell nothing."""
+    line = timeline.lay([cmu_walk, load(data / "cmu_run.bvh")])
+    (gap,), tried = line.gaps, []
+
+    def judged(clip, gaps, *args, **more):  # type: ignore[no-untyped-def]
+        which = min(len(tried), 1)
+        tried.append(len(gaps[0]))
+        said = replace(GapReport(0, 9, None, "made up"), foot_slide=slides[which])
+        said = replace(said, gliding=glides[which], foot_travel=travels[which])
+        return SimpleNamespace(report=SimpleNamespace(gaps=[said]))
+
+    monkeypatch.setattr(stitching, "fill", judged)
+    (length,), _ = stitching._tried(line, "auto", "", None)
+    assert tried[0] == len(gap)
+    assert tried[-1] <= len(gap) + cmu_walk.fps
+    assert (length > len(gap)) == longer
+
+
+@pytest.mark.parametrize(("pace", "goes_on"), [(15.0, True), (25.0, False)])
+def test_what_moves_too_fast_beside_a_key_is_another_pose(cmu_walk, pace, goes_on):
+    """Metres a second, of a body: it tells nothing of how the motion comes to the key, or leaves it."""
+    translation = cmu_walk.translation.copy()
+    translation[40:, 0, 0] += pace / cmu_walk.fps
+    odd = cmu_walk.with_motion(cmu_walk.rotation, translation)
+    later, sooner = blocked(odd, 40, cmu_walk, 70, {}, 20), blocked(cmu_walk, 10, odd, 39, {}, 20)
+    assert (later.keys[0] > 0) == goes_on
+    assert (len(sooner.clip) > sooner.keys[-1] + 1) == goes_on
 
 
 @pytest.fixture(scope="module")

@@ -332,11 +332,11 @@ def test_a_foot_that_drifts_while_it_stands_is_told(walk):
         np.repeat(pose.rotation, len(walk), axis=0), np.repeat(pose.translation, len(walk), axis=0)
     )
     whole, gap = Observation.full(clip), (45, 75)
-    assert feet.drift(clip, whole, *gap)[0] == 0
+    assert feet.drifts(clip, whole, [gap])[0][0] == 0
     moved = clip.translation.copy()
     moved[:, 0, 2] += np.clip((np.arange(len(walk)) - 45) / 30, 0, 1) * 0.2
     drifting = clip.with_motion(clip.rotation, moved)
-    way, joint, start, stop = feet.drift(drifting, whole, *gap)
+    [(way, joint, start, stop)] = feet.drifts(drifting, whole, [gap])
     assert way == pytest.approx(0.2, abs=0.02)
     assert joint in feet.ends(walk.skeleton)
     assert (start, stop) == gap

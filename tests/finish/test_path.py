@@ -92,6 +92,13 @@ def test_a_way_that_the_motion_does_not_walk_is_said(cmu_walk):
     assert any("times as long as" in note for note in report.notes)
 
 
+@pytest.mark.parametrize(("aside", "said"), [(0.5, False), (1.2, True)])
+def test_a_detour_is_said_from_half_as_long_again_on(cmu_walk, aside, said):
+    point = cmu_walk.root[MIDDLE, [0, 2]] + [aside, 0.0]
+    (report,) = interpose.fill(cmu_walk, GAP, method="spline", path={MIDDLE: point}).report.gaps
+    assert any("times as long as" in note for note in report.notes) == said
+
+
 def test_a_gap_that_a_simpler_method_filled_is_said_to_be_its(cmu_walk, data):
     """None that `stmi-gan` fills: led, or with the arm of another clip in it, it is still the spline's."""
     gap, jump = (50, 150), interpose.load(data / "cmu_jump.bvh")

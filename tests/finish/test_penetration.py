@@ -55,6 +55,18 @@ def test_an_arm_through_the_trunk_is_said_and_real_motion_is_not(cmu_walk, throu
     assert deepest(through(cmu_walk), 70, 78)[1] == "", "as deep in the frames beside it"
 
 
+@pytest.mark.parametrize(("seconds", "said"), [(1.3, False), (3.0, True)])
+def test_what_is_as_deep_within_two_seconds_beside_is_no_news(cmu_walk, through, seconds, said):
+    """A body that is stout there is stout here; what happens later tells nothing of it."""
+    back = np.r_[0:209, 207:0:-1]
+    clip = through(cmu_walk.with_motion(cmu_walk.rotation[back], cmu_walk.translation[back]))
+    later = round(80 + seconds * clip.fps)
+    rotation = clip.rotation.copy()
+    rotation[later : later + 20] = clip.rotation[60:80]
+    words = deepest(clip.with_motion(rotation, clip.translation), 50, 85)[1]
+    assert bool(words) == said
+
+
 def test_depth_turns_and_scales_with_the_body(cmu_walk, through):
     clip = through(cmu_walk)
     before = depths(clip.skeleton, clip.positions())[1]

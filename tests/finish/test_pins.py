@@ -72,6 +72,17 @@ def test_a_hand_slows_down_to_the_place_that_it_holds_while_the_body_goes_on(cmu
     assert jumps.max() * cmu_walk.fps**2 < 8
 
 
+def test_a_hand_leaves_its_own_way_a_third_of_a_second_before_it_holds_a_place(cmu_walk):
+    """Sooner it would be led by nothing for long, later it would be jerked: 10 m/s^2."""
+    gap, hand, frames = Gap(60, 120), cmu_walk.skeleton.index("LeftHand"), np.arange(90, 100)
+    free = tasks.fill(cmu_walk, [gap], "spline").clip.positions()
+    pin = Pin("LeftHand", frames, np.tile(free[95, hand] + [0.0, 0.1, 0.0], (10, 1)))
+    done = tasks.fill(cmu_walk, [gap], "spline", pins=[pin]).clip.positions()
+    jumps = np.linalg.norm(np.diff(done[:, hand], n=2, axis=0), axis=-1) * cmu_walk.fps**2
+    assert jumps[84:106].max() < 8.5
+    assert jumps[68:79].max() < 2
+
+
 def test_the_rest_of_the_body_makes_room_evenly(cmu_walk):
     """A hand at the ear, where frames that are solved each for itself throw the elbow about: 42 m/s^2."""
     gap, hand, head = Gap(60, 120), *(cmu_walk.skeleton.index(name) for name in ("LeftHand", "Head"))

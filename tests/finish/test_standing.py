@@ -8,6 +8,8 @@ from tests.skeletons.rigs import under_root
 
 import interpose
 from interpose.clip import Clip, Skeleton
+from interpose.finish import standing
+from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.observation.timeline import Placement
@@ -83,6 +85,32 @@ def test_a_rest_pose_beside_it_does_not_tell_where_the_body_is(cmu_walk):
     assert _off(done, cmu_walk)[1:60].max() < 0.1
     whole = interpose.recover(cmu_walk.with_motion(rotation, translation), place=True).clip
     assert _off(whole, cmu_walk)[1:].max() < 0.2
+
+
+def test_a_pose_that_has_nothing_to_do_with_the_others_does_not_throw_the_body(data):
+    """A rest pose between two parts of a run: how feet get there, at 9 m/s, tells nothing of the way. Taken
+    for a step it would throw the body up by 90 cm."""
+    run = load(data / "cmu_run.bvh").slice(1, 42)
+    frames, hips = np.r_[14:27, 7:20], hips_of(run.skeleton)
+    rotation = run.rotation[frames]
+    rotation[13] = run.skeleton.rest_rotation
+    done = interpose.recover(run.with_motion(rotation, run.translation[frames]), place=True).clip
+    off = done.positions()[15:, hips] - run.positions()[9:20, hips]
+    assert np.linalg.norm(off - off[0], axis=-1).max() < 0.3
+    assert np.abs(off[:, 1]).max() < 0.15
+
+
+@pytest.mark.parametrize(("slower", "flies"), [(1.5, False), (3.0, True)])
+def test_what_would_hold_a_body_back_on_its_way_up_has_left_it(slower, flies):
+    """In gravities: nobody comes to rest on a leg much faster than by falling, as the floor does not pull."""
+    falls, frames = standing.GRAVITY / 30**2, np.arange(12)
+    pace = np.where(frames < 6, 2.0 / 30, 2.0 / 30 - slower * falls)
+    against = np.zeros((12, 1, 3))
+    against[:, 0, 1] = -0.9 - np.cumsum(pace)
+    known = frames == 0
+    stands = standing._begun(np.zeros((12, 3)), against, known, falls, torn=1.0)[:, 0]
+    assert stands[:5].all()
+    assert stands[5] != flies
 
 
 def test_it_turns_and_moves_with_the_clip(cmu_walk):

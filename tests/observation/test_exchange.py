@@ -11,7 +11,8 @@ import pytest
 import interpose
 from interpose import formats, tasks
 from interpose.geometry import rotations
-from interpose.observation.exchange import Flip, exchanges, put_back
+from interpose.observation import exchange
+from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import scan, to_gaps
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
@@ -131,6 +132,50 @@ def test_denoise_puts_them_back_and_says_so(cmu_walk):
     assert {at for one in done.report.exchanged for at in one.frames} == {"80:104"}
     assert "put back" in str(done.report)
     assert tasks.denoise(odd, 0).clip.rotation.tobytes() == odd.rotation.tobytes()
+
+
+def spells(clip, way, start, stop):
+    """Where two thighs are found on the wrong side that are turned by `way` (F,) radians ahead and back, and
+    are so in the frames start to stop - 1."""
+    sides = tuple((clip.skeleton.index(side + "UpLeg"),) for side in ("Left", "Right"))
+    rotation = np.repeat(clip.rotation[:1], len(way), axis=0)
+    signs = np.ones(len(way))
+    signs[start:stop] = -1
+    for (joint,), sign in zip(sides, (1, -1)):
+        rotation[:, joint] = rotations.about("X", sign * signs * way)
+    held = clip.with_motion(rotation, np.repeat(clip.translation[:1], len(way), axis=0))
+    return [(one.start, one.stop) for one in exchange._spells(held, Exchange(0, 0, *sides))]
+
+
+@pytest.mark.parametrize(("turn", "found"), [(0.5, False), (0.7, True)])
+def test_an_exchange_turns_joints_by_more_than_they_move(cmu_walk, turn, found):
+    """By both together, in radians, at one end or both."""
+    assert spells(cmu_walk, np.full(60, turn / 4), 20, 40) == [(20, 40)] * found
+
+
+@pytest.mark.parametrize(("turn", "found"), [(0.07, False), (0.15, True)])
+def test_the_other_end_of_an_exchange_may_turn_them_less(cmu_walk, turn, found):
+    way = np.interp(np.arange(60), [22, 38], [0.25, turn / 4])
+    assert spells(cmu_walk, way, 20, 40) == [(20, 40)] * found
+
+
+@pytest.mark.parametrize(
+    ("end", "share", "found"), [(20, 0.4, True), (20, 0.6, False), (40, 0.75, True), (40, 0.85, False)]
+)
+def test_an_exchange_that_is_undone_leaves_a_smaller_turn(cmu_walk, end, share, found):
+    """At one end half of it at most, at the other four fifths: what is left is the legs' own motion."""
+    beside = 0.3 * (1 - share) / (1 + share)
+    way = np.where(np.arange(60) < end, 0.3, beside)
+    # What begins with the smaller share ends with a turn that is none of the sure ones.
+    if end == 20:
+        way = np.interp(np.arange(60), [19, 20, 38], [0.3, beside, 0.05])
+    assert spells(cmu_walk, way, 20, 40) == [(20, 40)] * found
+
+
+@pytest.mark.parametrize(("seconds", "found"), [(2.9, True), (3.2, False)])
+def test_of_long_exchanges_nobody_knows_which_side_is_wrong(cmu_walk, seconds, found):
+    stop = 20 + round(seconds * cmu_walk.fps)
+    assert spells(cmu_walk, np.full(150, 0.3), 20, stop) == [(20, stop)] * found
 
 
 @pytest.mark.parametrize("name", ["cmu_walk.bvh", "cmu_run.bvh", "cmu_jump.bvh"])

@@ -243,18 +243,23 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     return list(zip(slides, [measures.foot_travel(feet[part]) for part in parts]))
 
 
-def drift(clip: Clip, known: Observation, start: int, stop: int) -> tuple[float, int, int, int] | None:
-    """The furthest that a foot gets in one stance within frames start to stop - 1, in metres; the joint, and
-    the frames of it. None for skeletons whose feet are not known by name; see `measures.stance_drift`."""
+def drifts(
+    clip: Clip, known: Observation, ranges: list[tuple[int, int]]
+) -> list[tuple[float, int, int, int]]:
+    """The furthest that a foot gets in one stance within the frames start to stop - 1 of each range, in
+    metres; the joint, and the frames of it. An empty list for skeletons whose feet are not known by name; see
+    `measures.stance_drift`."""
     joints = pairs(clip.skeleton)
     if not joints.size:
-        return None
+        return []
     feet, grown = clip.positions()[:, joints], size(clip.skeleton)
-    floor = grown * local_floor(feet / grown, known.positions(clip.skeleton)[:, joints], clip.fps)
-    inside = slice(start, stop)
-    flat, low = (some[inside].reshape(stop - start, joints.size, *some.shape[3:]) for some in (feet, floor))
-    way, joint, first, last = measures.stance_drift(flat / grown, clip.fps, low / grown)
-    return grown * way, int(joints.ravel()[joint]), start + first, start + last
+    floor = local_floor(feet / grown, known.positions(clip.skeleton)[:, joints], clip.fps)
+    feet, floor = (feet / grown).reshape(len(clip), -1, 3), floor.reshape(len(clip), -1)
+    found = []
+    for start, stop in ranges:
+        way, joint, first, last = measures.stance_drift(feet[start:stop], clip.fps, floor[start:stop])
+        found.append((grown * way, int(joints.ravel()[joint]), start + first, start + last))
+    return found
 
 
 def plant(

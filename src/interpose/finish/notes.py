@@ -149,9 +149,8 @@ def skids(slide: float | None, finished: Clip, known: Observation, gap: Gap, fir
     if slide > max(SKIDS * (most or 0.0), SLIDES if most is not None else UNSEEN):
         around = f", around the gap at {most:.0f} at most" if most is not None else ""
         said.append(f"flagged: feet slide at {slide:.0f} cm/s{around}")
-    way, joint, start, stop = feet.drift(part, seen, gap.start - lo, gap.stop - lo) or (0.0, 0, 0, 0)
-    usual = [found[0] for a, b in whole if (found := feet.drift(part, seen, a, b))]
-    if way > max(DRIFTS * feet.size(finished.skeleton), 2 * max(usual, default=0.0)):
+    (way, joint, start, stop), *usual = feet.drifts(part, seen, [(gap.start - lo, gap.stop - lo), *whole])
+    if way > max(DRIFTS * feet.size(finished.skeleton), 2 * max((one for one, *_ in usual), default=0.0)):
         name, frames = finished.skeleton.names[joint], f"{first + lo + start} to {first + lo + stop - 1}"
         said.append(f"flagged: {name} slides by {100 * way:.0f} cm while it stands, in frames {frames}")
     return said

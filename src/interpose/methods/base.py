@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial, reduce
 
 import numpy as np
@@ -339,42 +339,77 @@ def run_long(cards: Sequence[weights.Card], motion: Seen) -> Answer:
     far from any hole nothing does (NaN).
     """
     local, root, known = motion.local.copy(), motion.root.copy(), motion.known.astype(float)
-    motion = replace(motion, local=local, root=root, known=known)
-    frames, sight = len(root), cards[0].max_gap
-    stands, expected = np.full((frames, len(FEET)), np.nan), np.full(frames, np.nan)
+    motion, frames = replace(motion, local=local, root=root, known=known), len(root)
+    done = Answer(local, root, np.full((frames, len(FEET)), np.nan), np.full(frames, np.nan))
     for begin, end in runs(np.logical_not(motion.known.all(axis=1))):
-        step, last_step = steps(known, begin, end, sight)
-        closed = begin > 0 and end < frames
-        in_turn = closed and not known[begin:end].any()
-        astray, backwards = in_turn and end - begin > ASTRAY, begin == 0 and end < frames
-        # Whether errors are told; what the frames at both ends are expected to be off by themselves.
-        judged, carried = False, [0.0, 0.0]
-        while begin < end:
-            first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
-            if end - begin > sight:
-                first, last = (end - sight, last) if backwards else (first, begin + sight)
-            inside = over = slice(begin, end)
-            if end - begin > last_step:
-                inside = slice(end - step, end) if backwards else slice(begin, begin + step)
-            part, own = slice(first, last), slice(inside.start - first, inside.stop - first)
-            said = ask(cards, motion.part(part), own)
-            for held_back, new in ((stands, said.stands), (expected, said.expected)):
-                held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
-            if not judged:
-                # The first window that sees all that is left tells the errors of all of it. What the frames
-                # that it starts from are off by goes on, and wears off towards what is known.
-                judged = end - begin <= sight
-                over = over if judged else inside
-                near, far = carried if judged and closed else [carried[backwards]] * 2
-                expected[over] = said.expected[over.start - first : over.stop - first]
-                expected[over] += np.linspace(near, far, over.stop - over.start)
-                carried[backwards] = float(expected[over][0 if backwards else -1])
-            if astray and end - begin > sight:
-                said = ask(cards, led(motion, begin, end).part(part), own)
-            held = known[inside] >= 1
-            local[inside] = np.where(held[:, :-1, None], local[inside], said.local[own])
-            root[inside] = np.where(held[:, -1:], root[inside], said.root[own])
-            stands[inside], known[inside] = said.stands[own], 1.0
-            begin, end = (begin, inside.start) if backwards else (inside.stop, end)
-            backwards = backwards != in_turn
-    return Answer(local, root, stands, expected)
+        _complete_hole(cards, motion, done, begin, end)
+    return done
+
+
+def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, begin: int, end: int) -> None:
+    """Complete the frames begin to end - 1 of a motion, window by window.
+
+    motion: becomes known there; `done` has its rotations and places, and is told of feet and errors.
+    """
+    frames, sight = len(motion.root), cards[0].max_gap
+    step, last_step = steps(motion.known, begin, end, sight)
+    closed = begin > 0 and end < frames
+    in_turn = closed and not motion.known[begin:end].any()
+    astray, backwards = in_turn and end - begin > ASTRAY, begin == 0 and end < frames
+    errors = _Errors(done.expected, closed)
+    while begin < end:
+        first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
+        if end - begin > sight:
+            first, last = (end - sight, last) if backwards else (first, begin + sight)
+        inside = slice(begin, end)
+        if end - begin > last_step:
+            inside = slice(end - step, end) if backwards else slice(begin, begin + step)
+        part, own = slice(first, last), slice(inside.start - first, inside.stop - first)
+        said = ask(cards, motion.part(part), own)
+        for held_back, new in ((done.stands, said.stands), (done.expected, said.expected)):
+            held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
+        # The first window that sees all that is left tells the errors of all of it.
+        sees_all = end - begin <= sight
+        errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
+        if astray and not sees_all:
+            said = ask(cards, led(motion, begin, end).part(part), own)
+        _take(motion, inside, said, own)
+        done.stands[inside] = said.stands[own]
+        begin, end = (begin, inside.start) if backwards else (inside.stop, end)
+        backwards = backwards != in_turn
+
+
+def _take(motion: Seen, inside: slice, said: Answer, own: slice) -> None:
+    """Take what is said, in its frames `own`, of the frames `inside` of a motion as known."""
+    held = motion.known[inside] >= 1
+    motion.local[inside] = np.where(held[:, :-1, None], motion.local[inside], said.local[own])
+    motion.root[inside] = np.where(held[:, -1:], motion.root[inside], said.root[own])
+    motion.known[inside] = 1.0
+
+
+@dataclass
+class _Errors:
+    """The errors that are expected in a hole. What the frames are off by that a window starts from goes on
+    in what it completes, and wears off towards what is known, if both sides are (`closed`).
+
+    Attributes:
+        expected: (F,) metres, of the whole motion.
+        carried: what the frames at both ends of what is left are expected to be off by themselves.
+        told: whether all of it has been told.
+    """
+
+    expected: np.ndarray
+    closed: bool
+    carried: list[float] = field(default_factory=lambda: [0.0, 0.0])
+    told: bool = False
+
+    def tell(self, said: np.ndarray, first: int, over: slice, backwards: bool, all_left: bool) -> None:
+        """Note what a window from frame `first` on says of the frames `over`, which may be `all_left`; it
+        goes on from the beginning of the hole, or `backwards` from its end."""
+        if self.told:
+            return
+        self.told = all_left
+        near, far = self.carried if all_left and self.closed else [self.carried[backwards]] * 2
+        wearing = np.linspace(near, far, over.stop - over.start)
+        self.expected[over] = said[over.start - first : over.stop - first] + wearing
+        self.carried[backwards] = float(self.expected[over][0 if backwards else -1])

@@ -275,12 +275,41 @@ def _runs(zero: np.ndarray, steps: np.ndarray, least: float) -> Iterator[Run]:
         yield Run(start, stop, jumps(into), jumps(out))
 
 
+@dataclass(frozen=True)
+class _Steps:
+    """The steps between the frames `first`, first + 1, ... of a clip: turns (n, J) and ways (n, P) as in
+    `_steps`, and which of them are none."""
+
+    clip: Clip
+    turned: np.ndarray
+    moved: np.ndarray
+    first: int
+    still: np.ndarray
+    stopped: np.ndarray
+
+    @property
+    def shortest(self) -> int:
+        """How many steps a frozen run has, at least."""
+        return max(3, round(SHORTEST * self.clip.fps))
+
+    def finding(self, kind: str, joints: tuple[str, ...] | None, run: Run, why: str = "") -> Finding:
+        """What a run says."""
+        # Steps start..stop - 1 are zero, so frames start..stop are equal. One of them is good, unless both
+        # ends jump: the first, which was held, or the last where the clip begins with the run.
+        begin = run.start + (0 if run.jumps_in or run.start == 0 else 1)
+        end = run.stop + (0 if run.start == 0 and not run.jumps_out else 1)
+        what = "the position stands" if kind == "frozen position" else "nothing moves"
+        if kind == "still" and not why:
+            to_end = run.stop == len(self.turned)
+            why = f", {'to the end, ' * to_end}and comes to rest {'' if to_end else 'and sets off '}by itself"
+        note = f"{what} for {(run.stop - run.start) / self.clip.fps:.2f} s{why}"
+        return Finding(kind, joints, self.first + begin, self.first + end, note)
+
+
 def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> list[Finding]:
     """Frozen runs; the steps are those between the frames `first`, first + 1, ..."""
-    names = clip.skeleton.names
-    shortest = max(3, round(SHORTEST * clip.fps))
     with np.errstate(invalid="ignore"):
-        still, stopped = turned < STILL, moved < STILL
+        steps = _Steps(clip, turned, moved, first, turned < STILL, moved < STILL)
     alive = np.flatnonzero(np.nansum(turned, axis=0) > LIFELESS)
     walking = np.flatnonzero(np.nansum(moved, axis=0) > LIFELESS)
     if not len(alive):
@@ -289,75 +318,78 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
         also = "the body neither, " if not len(walking) else ""
         note = f"no joint turns at all, {also}in the whole clip of {len(clip) / clip.fps:.2f} s"
         return [Finding("still", None, first, first + len(turned) + 1, note)]
-    found: list[Finding] = []
+    whole = np.asarray(steps.still[:, alive].all(axis=1) & steps.stopped[:, walking].all(axis=1))
+    poses, stands = _frozen_poses(steps, whole, alive)
+    return poses + _frozen_joints(steps, whole, alive) + _frozen_places(steps, whole, walking, stands)
 
-    def add(kind: str, joints: tuple[str, ...] | None, run: Run, why: str = "") -> None:
-        # Steps start..stop - 1 are zero, so frames start..stop are equal. One of them is good, unless both
-        # ends jump: the first, which was held, or the last where the clip begins with the run.
-        begin = run.start + (0 if run.jumps_in or run.start == 0 else 1)
-        end = run.stop + (0 if run.start == 0 and not run.jumps_out else 1)
-        what = "the position stands" if kind == "frozen position" else "nothing moves"
-        note = f"{what} for {(run.stop - run.start) / clip.fps:.2f} s"
-        to_end = run.stop == len(turned)
-        rest = (
-            ", to the end, and comes to rest by itself"
-            if to_end
-            else ", and comes to rest and sets off by itself"
-        )
-        note += why or (rest if kind == "still" else "")
-        found.append(Finding(kind, joints, first + begin, first + end, note))
 
-    whole = np.asarray(still[:, alive].all(axis=1) & stopped[:, walking].all(axis=1))
-    stands = np.zeros(len(whole), bool)
-    for run in _runs(whole, turned[:, alive].max(axis=1), JUMP_TURN):
-        if run.stop - run.start >= shortest:
-            begin, end = first + run.start, first + run.stop
-            rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin]) < LIFELESS
-            # Who stands in the rest pose does so to be measured.
-            rest = rests.mean() > 0.5
-            measured = (
-                rest and end - begin >= CALIBRATION * clip.fps and (run.start == 0 or run.stop == len(turned))
-            )
-            calm = rest or _pace_beside(clip, begin, end) <= PACE
-            lost = run.jumps_in or run.jumps_out or not calm
-            why = ", in the rest pose, as for measuring" if measured else ""
-            add("frozen" if lost and not measured else "still", None, run, why)
-            # Where that is, is as real.
-            stands[run.start : run.stop] |= measured
+def _frozen_poses(steps: _Steps, whole: np.ndarray, alive: np.ndarray) -> tuple[list[Finding], np.ndarray]:
+    """Runs of steps (n,) in which the `whole` pose stands still, and the steps (n,) of those in which it does
+    so to be measured."""
+    clip, found, stands = steps.clip, list[Finding](), np.zeros(len(whole), bool)
+    for run in _runs(whole, steps.turned[:, alive].max(axis=1), JUMP_TURN):
+        if run.stop - run.start < steps.shortest:
+            continue
+        begin, end = steps.first + run.start, steps.first + run.stop
+        rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin]) < LIFELESS
+        # Who stands in the rest pose does so to be measured.
+        rest = rests.mean() > 0.5
+        at_end = run.start == 0 or run.stop == len(whole)
+        measured = rest and end - begin >= CALIBRATION * clip.fps and at_end
+        calm = rest or _pace_beside(clip, begin, end) <= PACE
+        lost = run.jumps_in or run.jumps_out or not calm
+        why = ", in the rest pose, as for measuring" if measured else ""
+        found.append(steps.finding("frozen" if lost and not measured else "still", None, run, why))
+        # Where that is, is as real.
+        stands[run.start : run.stop] |= measured
+    return found, stands
 
+
+def _frozen_joints(steps: _Steps, whole: np.ndarray, alive: np.ndarray) -> list[Finding]:
+    """Joints that stop turning where the `whole` pose does not; those that do so together are one finding."""
+    clip, still, turned = steps.clip, steps.still, steps.turned
     # Joints without data but for some steps, like the fingers of many files, are left out.
     lively = [joint for joint in alive.tolist() if _lively(still[:, joint] & ~whole, still[:, joint])]
     together: dict[Run, list[int]] = {}
     pauses: dict[tuple[int, int], list[int]] = {}
     turnless = still[:, lively].all(axis=1) & ~whole & (len(lively) >= MANY)
     for run in _runs(turnless, turned[:, lively].max(axis=1, initial=0.0), JUMP_TURN):
-        if run.stop - run.start >= shortest:
+        if run.stop - run.start >= steps.shortest:
             together[run] = lively
         else:
             turnless[run.start : run.stop] = False
     for joint in lively:
-        steps = turned[:, joint]
-        for run in _runs(still[:, joint] & ~whole & ~turnless, steps, JUMP_TURN):
-            value = clip.rotation[first + run.start, joint]
+        own = turned[:, joint]
+        for run in _runs(still[:, joint] & ~whole & ~turnless, own, JUMP_TURN):
+            value = clip.rotation[steps.first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
-            if _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_TURN * (not at_limit)):
+            if _suspicious(run, clip.fps, np.nanmean(own) / EXPECTED_TURN * (not at_limit)):
                 together.setdefault(run, []).append(joint)
-            elif run.stop - run.start >= shortest:
+            elif run.stop - run.start >= steps.shortest:
                 pauses.setdefault((run.start, run.stop), []).append(joint)
+    found = []
     for run, joints in together.items():
         joints = sorted({*joints, *pauses.pop((run.start, run.stop), [])})
-        add("frozen", tuple(names[joint] for joint in joints), run)
+        found.append(steps.finding("frozen", tuple(clip.skeleton.names[joint] for joint in joints), run))
+    return found
+
+
+def _frozen_places(
+    steps: _Steps, whole: np.ndarray, walking: np.ndarray, stands: np.ndarray
+) -> list[Finding]:
+    """Places that stop, or stand still for long, while the pose does not; not beside steps in which a body
+    `stands` to be measured."""
+    clip, found = steps.clip, []
     for column in walking.tolist():
-        steps = moved[:, column]
-        for run in _runs(stopped[:, column] & ~whole, steps, JUMP_WAY):
-            beside = np.nanmax(
-                [*steps[max(run.start - 1, 0) : run.start], *steps[run.stop : run.stop + 1], 0.0]
-            )
-            stopped_dead = beside * clip.fps > PACE and run.stop - run.start >= shortest
+        own = steps.moved[:, column]
+        for run in _runs(steps.stopped[:, column] & ~whole, own, JUMP_WAY):
             if stands[max(run.start - 1, 0) : run.stop + 1].any():
                 continue
-            if stopped_dead or _suspicious(run, clip.fps, np.nanmean(steps) / EXPECTED_WAY):
-                add("frozen position", (names[placed(clip)[column]],), run)
+            beside = [*own[max(run.start - 1, 0) : run.start], *own[run.stop : run.stop + 1], 0.0]
+            stopped_dead = np.nanmax(beside) * clip.fps > PACE and run.stop - run.start >= steps.shortest
+            if stopped_dead or _suspicious(run, clip.fps, np.nanmean(own) / EXPECTED_WAY):
+                name = clip.skeleton.names[placed(clip)[column]]
+                found.append(steps.finding("frozen position", (name,), run))
     return found
 
 

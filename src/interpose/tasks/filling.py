@@ -21,8 +21,8 @@ from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
 from interpose.skeletons import find_humanoid
 from interpose.tasks.moments import mended, momentary, with_moments
-from interpose.tasks.planning import plan, seed_of
-from interpose.tasks.windows import CONTEXT, OVERLAP, joined, paste, put_together, shifted, together
+from interpose.tasks.planning import Job, plan, seed_of
+from interpose.tasks.windows import OVERLAP, Piece, joined, paste, put_together, shifted, together
 
 
 def fill(
@@ -76,35 +76,77 @@ def fill(
     max_gap = None if max_gap is None else longest(max_gap, clip.fps)
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, fitted(parts, clip))
-    piecemeal = isinstance(gaps, Observation) and not observation.pins
+    piecemeal = isinstance(gaps, Observation) and not observation.pins and method in ("auto", "spline")
     brief = momentary(clip, observation) if piecemeal else None
-    if brief and method in ("auto", "spline"):
-        laid, seen = mended(clip, observation, brief)
-        rest = fill(
-            laid,
-            seen,
-            method,
-            max_gap=max_gap,
-            only=only,
-            seed=seed,
-            methods=methods,
-            progress=progress,
-            action=action,
-            path=path,
-            temperature=temperature,
-            zero=zero,
-        )
-        return with_moments(rest, clip, brief)
+    if brief:
+        clip, observation = mended(clip, observation, brief)
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
             "there is nothing to go by",
             "no value of the clip is observed, so any motion would do",
             "Leave at least one frame out of the gaps.",
         )
-    path = _points(path or {})
-    whole, clip = clip, _handed(clip, observation)
-    spans(clip, observation, path)
+    points, whole = _points(path or {}), _Whole(clip, observation)
+    clip = _handed(clip, observation)
+    spans(clip, observation, points)
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
+    _check_open(jobs, points)
+    limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
+    work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
+    for done, (group, chosen) in enumerate(work):
+        pieces = [piece for piece in group.pieces if piece.job.method == chosen]
+        lo, hi = group.around(len(clip), clip.fps)
+        # The file tells what its joints can do, and is not what the window is written to.
+        window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
+        other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
+        led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
+        way = {frame - lo: point for frame, point in points.items() if frame in led}
+        part = complete(window, seen, chosen, seed, other, limit=limit, path=way, first=lo - zero)
+        whole.take(part, pieces, lo)
+        if progress:
+            progress((done + 1) / len(work))
+    left = [job.gap for job in jobs if job.method is None]
+    filled = whole.completion(Report(method, whole.told(), left, action))
+    return with_moments(filled, clip, brief) if brief else filled
+
+
+class _Whole:
+    """A clip as it is put together from completed windows."""
+
+    def __init__(self, clip: Clip, observation: Observation) -> None:
+        self.clip = clip
+        self.known = observation.rotation, observation.translation[:, list(clip.translated)]
+        self.rotation, self.translation = clip.rotation.copy(), clip.translation.copy()
+        missing = ~observation.rotation
+        missing[:, list(clip.translated)] |= ~self.known[1]
+        self.provenance = np.where(missing, Provenance.OPEN, Provenance.OBSERVED).astype(np.int8)
+        self.said: list[tuple[int, slice, Raw]] = []
+        self.reports: list[GapReport] = []
+
+    def take(self, part: Completion, pieces: Sequence[Piece], lo: int) -> None:
+        """Take pieces from what was completed of the frames from `lo` on."""
+        for job, start, stop in pieces:
+            fade = min(round(OVERLAP * self.clip.fps), stop - start) if start > job.gap.start else 0
+            inside = slice(start - lo, stop - lo)
+            paste(self.rotation, part.clip.rotation, self.known[0], start, inside, fade)
+            paste(self.translation, part.clip.translation, self.known[1], start, inside, fade)
+            self.provenance[start:stop] = part.provenance[inside]
+            self.said.append((start, inside, part.raw))
+            self.reports += shifted(part.report.gaps, lo, start, stop, job)
+
+    def told(self) -> list[GapReport]:
+        """A report for each gap, in order of time."""
+        return joined(sorted(self.reports, key=lambda gap: (gap.number, gap.start)))
+
+    def completion(self, report: Report) -> Completion:
+        """All of it."""
+        clip, said = self.clip, self.said
+        done = clip.with_motion(self.rotation, self.translation)
+        return Completion(done, lambda: put_together(clip, said), self.provenance, report)
+
+
+def _check_open(jobs: Iterable[Job], path: Iterable[int]) -> None:
+    """RequestError for frames of a path in a gap that stays open."""
     for frame in path:
         if any(job.method is None and job.gap.start <= frame < job.gap.stop for job in jobs):
             raise RequestError(
@@ -112,42 +154,6 @@ def fill(
                 "the gap is longer than allowed, or not among the gaps chosen",
                 "Leave the point out, or let the gap be filled.",
             )
-    rotation, translation = clip.rotation.copy(), clip.translation.copy()
-    missing = ~observation.rotation
-    missing[:, list(clip.translated)] |= ~observation.translation[:, list(clip.translated)]
-    provenance = np.where(missing, Provenance.OPEN, Provenance.OBSERVED).astype(np.int8)
-    said: list[tuple[int, slice, Raw]] = []
-    reports: list[GapReport] = []
-    limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
-    work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
-    for done, (group, chosen) in enumerate(work):
-        margin = round(CONTEXT * clip.fps)
-        lo, hi = max(0, group.pieces[0].start - margin), min(len(clip), group.pieces[-1].stop + margin)
-        pieces = [piece for piece in group.pieces if piece.job.method == chosen]
-        led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
-        way = {f - lo: point for f, point in path.items() if f in led}
-        # The file tells what its joints can do, and is not what the window is written to.
-        window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
-        other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
-        part = complete(window, seen, chosen, seed, other, limit=limit, path=way, first=lo - zero)
-        for job, start, stop in pieces:
-            fade = min(round(OVERLAP * clip.fps), stop - start) if start > job.gap.start else 0
-            inside = slice(start - lo, stop - lo)
-            paste(rotation, part.clip.rotation, observation.rotation, start, inside, fade)
-            known = observation.translation[:, list(clip.translated)]
-            paste(translation, part.clip.translation, known, start, inside, fade)
-            provenance[start:stop] = part.provenance[inside]
-            said.append((start, inside, part.raw))
-            reports += shifted(part.report.gaps, lo, start, stop, job)
-        if progress:
-            progress((done + 1) / len(work))
-    reports.sort(key=lambda gap: (gap.number, gap.start))
-    reports = joined(reports)
-    left = [job.gap for job in jobs if job.method is None]
-    report = Report(method, reports, left, action)
-    return Completion(
-        whole.with_motion(rotation, translation), lambda: put_together(whole, said), provenance, report
-    )
 
 
 def _points(path: Mapping[int, Any]) -> dict[int, np.ndarray]:

@@ -50,6 +50,11 @@ class Group:
                 found.append(piece.job.method)
         return found
 
+    def around(self, frames: int, fps: float) -> tuple[int, int]:
+        """The frames, first to before last, of a clip of so many that are seen with it."""
+        margin = round(CONTEXT * fps)
+        return max(0, self.pieces[0].start - margin), min(frames, self.pieces[-1].stop + margin)
+
 
 def together(jobs: Sequence[Job], clip: Clip, observation: Observation) -> list[Group]:
     """All jobs in groups. What is near belongs together, filled or left open and by whatever method: each gap

@@ -146,103 +146,135 @@ def _rate(text: str, seconds: float) -> float:
 
 
 def _parse_hierarchy(text: bytes, what: str) -> list[Node]:
-    nodes: list[Node] = []
-    # Open blocks: the index of a joint, or None for an End Site. `ahead` waits for its brace.
-    blocks: list[int | None] = []
-    waiting = False
-    ahead: int | None = None
-    in_end = False
-
-    at = 0
-
-    def bad(why: str, fix: str = "The file is damaged: export it again.") -> FileError:
-        return FileError(what, f"line {at}: {why}", fix)
-
+    reading = _Hierarchy(what)
     for line in text.removeprefix(b"\xef\xbb\xbf").splitlines():
-        at += 1
         try:
             decoded = line.decode("utf-8")
         except UnicodeDecodeError:
             decoded = line.decode("latin-1")
-        words = decoded.replace("{", " { ").replace("}", " } ").split()
+        reading.line(decoded)
+    return reading.done()
+
+
+class _Hierarchy:
+    """A hierarchy as it is read line by line.
+
+    Attributes:
+        nodes: the joints so far.
+        blocks: open ones: the index of a joint, or None for an End Site.
+        ahead: the index of a joint, or None of an End Site, that waits for its brace; `waiting` says that
+            something does.
+    """
+
+    def __init__(self, what: str) -> None:
+        self.what, self.at = what, 0
+        self.nodes: list[Node] = []
+        self.blocks: list[int | None] = []
+        self.ahead: int | None = None
+        self.waiting = False
+
+    def bad(self, why: str, fix: str = "The file is damaged: export it again.") -> FileError:
+        """What is wrong with the line that is being read."""
+        return FileError(self.what, f"line {self.at}: {why}", fix)
+
+    def line(self, text: str) -> None:
+        """Read a line; several statements may stand in it."""
+        self.at += 1
+        words = text.replace("{", " { ").replace("}", " } ").split()
+        statements = {"ROOT": self._joint, "JOINT": self._joint, "END": self._end}
+        statements |= {"OFFSET": self._offset, "CHANNELS": self._channels}
         while words:
             key = words.pop(0)
             word = key.upper()
             if word == "{":
-                if not waiting:
-                    raise bad("a brace opens where none is expected")
-                blocks.append(None if in_end else ahead)
-                waiting = False
-            elif waiting:
-                raise bad(f'"{{" expected, found {key[:40]!r}')
+                self._open()
+            elif self.waiting:
+                raise self.bad(f'"{{" expected, found {key[:40]!r}')
             elif word == "}":
-                if not blocks:
-                    raise bad("a brace closes that was never opened")
-                closed = blocks.pop()
-                if closed is not None and not nodes[closed].offset:
-                    raise bad(f"{nodes[closed].name} has no OFFSET")
-                in_end = False
-            elif word in ("ROOT", "JOINT"):
-                if (word == "ROOT") != (not blocks) or in_end:
-                    raise bad(f"{word} stands at the wrong place")
-                brace = words.index("{") if "{" in words else len(words)
-                parent = blocks[-1] if blocks else None
-                ahead = len(nodes)
-                name = " ".join(words[:brace]) or f"joint{ahead}"
-                nodes.append(Node(name, -1 if parent is None else parent))
-                if len(nodes) > JOINT_LIMIT:
-                    raise bad(f"more than {JOINT_LIMIT} joints", "interpose reads no larger skeletons.")
-                words, waiting = words[brace:], True
-            elif word == "END":
-                if not blocks or in_end:
-                    raise bad("an End Site stands at the wrong place")
-                words = words[words.index("{") :] if "{" in words else []
-                waiting = in_end = True
-            elif word == "OFFSET":
-                values = [number(w) for w in words[:3]]
-                if len(values) < 3 or None in values or (len(words) > 3 and words[3] != "}"):
-                    raise bad(f"OFFSET needs three numbers, found {' '.join(words)[:60]!r}")
-                offset = tuple(float(v) for v in values)  # type: ignore[arg-type]
-                if not blocks:
-                    raise bad("OFFSET stands outside of a joint")
-                joint = blocks[-1]
-                if joint is None:
-                    owner = next(b for b in reversed(blocks) if b is not None)
-                    nodes[owner].ends.append(offset)
-                elif nodes[joint].offset:
-                    raise bad(f"{nodes[joint].name} has two OFFSETs")
-                else:
-                    nodes[joint].offset = offset
-                words = words[3:]
-            elif word == "CHANNELS":
-                joint = blocks[-1] if blocks else None
-                if joint is None or nodes[joint].channels is not None:
-                    raise bad("CHANNELS stands at the wrong place")
-                count = int(words[0]) if words and re.fullmatch("[0-9]{1,3}", words[0]) else -1
-                given = words[1 : words.index("}")] if "}" in words else words[1:]
-                if count != len(given):
-                    said = words[0][:20] if words else "nothing"
-                    raise bad(f"CHANNELS says {said}, {len(given)} names follow")
-                found = [_CHANNEL.match(w) for w in given]
-                if not all(found) or len({w.lower() for w in given}) < len(given):
-                    raise bad(
-                        f"unknown or repeated channels: {' '.join(given)[:80]}",
-                        "Channels are Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation.",
-                    )
-                nodes[joint].channels = tuple((m[2].lower(), m[1].upper()) for m in found if m)
-                words = words[1 + count :]
-            elif word == "HIERARCHY" and not nodes:
-                continue
-            else:
-                raise bad(f"cannot understand {key[:40]!r}")
-    if blocks or waiting:
-        raise bad("braces do not balance: the hierarchy ends inside of a joint")
-    if not nodes:
-        raise bad("there is no ROOT")
-    if not any(node.channels for node in nodes):
-        raise bad("no joint has channels")
-    bones = [node.offset for node in nodes if node.parent >= 0]
-    moved = any(kind == "position" for n in nodes if n.parent >= 0 for kind, _ in n.channels or ())
-    if bones and not moved and not np.any(bones):
-        raise FileError(what, "all its bones have length zero", "Export the clip with its skeleton.")
-    return nodes
+                self._close()
+            elif word in statements:
+                words = statements[word](word, words)
+            elif word != "HIERARCHY" or self.nodes:
+                raise self.bad(f"cannot understand {key[:40]!r}")
+
+    def _open(self) -> None:
+        if not self.waiting:
+            raise self.bad("a brace opens where none is expected")
+        self.blocks.append(self.ahead)
+        self.waiting = False
+
+    def _close(self) -> None:
+        if not self.blocks:
+            raise self.bad("a brace closes that was never opened")
+        closed = self.blocks.pop()
+        if closed is not None and not self.nodes[closed].offset:
+            raise self.bad(f"{self.nodes[closed].name} has no OFFSET")
+
+    def _joint(self, word: str, words: list[str]) -> list[str]:
+        """ROOT or JOINT, and the words of its name; those that are left come back, as from all statements."""
+        parent = self.blocks[-1] if self.blocks else -1
+        if (word == "ROOT") != (not self.blocks) or parent is None:
+            raise self.bad(f"{word} stands at the wrong place")
+        brace = words.index("{") if "{" in words else len(words)
+        self.ahead, self.waiting = len(self.nodes), True
+        self.nodes.append(Node(" ".join(words[:brace]) or f"joint{self.ahead}", parent))
+        if len(self.nodes) > JOINT_LIMIT:
+            raise self.bad(f"more than {JOINT_LIMIT} joints", "interpose reads no larger skeletons.")
+        return words[brace:]
+
+    def _end(self, _: str, words: list[str]) -> list[str]:
+        """End Site, whatever it is called."""
+        if not self.blocks or self.blocks[-1] is None:
+            raise self.bad("an End Site stands at the wrong place")
+        self.ahead, self.waiting = None, True
+        return words[words.index("{") :] if "{" in words else []
+
+    def _offset(self, _: str, words: list[str]) -> list[str]:
+        values = [number(w) for w in words[:3]]
+        if len(values) < 3 or None in values or (len(words) > 3 and words[3] != "}"):
+            raise self.bad(f"OFFSET needs three numbers, found {' '.join(words)[:60]!r}")
+        offset = tuple(float(v) for v in values)  # type: ignore[arg-type]
+        if not self.blocks:
+            raise self.bad("OFFSET stands outside of a joint")
+        joint = self.blocks[-1]
+        if joint is None:
+            owner = next(b for b in reversed(self.blocks) if b is not None)
+            self.nodes[owner].ends.append(offset)
+        elif self.nodes[joint].offset:
+            raise self.bad(f"{self.nodes[joint].name} has two OFFSETs")
+        else:
+            self.nodes[joint].offset = offset
+        return words[3:]
+
+    def _channels(self, _: str, words: list[str]) -> list[str]:
+        joint = self.blocks[-1] if self.blocks else None
+        if joint is None or self.nodes[joint].channels is not None:
+            raise self.bad("CHANNELS stands at the wrong place")
+        count = int(words[0]) if words and re.fullmatch("[0-9]{1,3}", words[0]) else -1
+        given = words[1 : words.index("}")] if "}" in words else words[1:]
+        if count != len(given):
+            said = words[0][:20] if words else "nothing"
+            raise self.bad(f"CHANNELS says {said}, {len(given)} names follow")
+        found = [_CHANNEL.match(w) for w in given]
+        if not all(found) or len({w.lower() for w in given}) < len(given):
+            raise self.bad(
+                f"unknown or repeated channels: {' '.join(given)[:80]}",
+                "Channels are Xposition, Yposition, Zposition, Xrotation, Yrotation, Zrotation.",
+            )
+        self.nodes[joint].channels = tuple((m[2].lower(), m[1].upper()) for m in found if m)
+        return words[1 + count :]
+
+    def done(self) -> list[Node]:
+        """All joints; FileError where they are no skeleton that moves."""
+        nodes = self.nodes
+        if self.blocks or self.waiting:
+            raise self.bad("braces do not balance: the hierarchy ends inside of a joint")
+        if not nodes:
+            raise self.bad("there is no ROOT")
+        if not any(node.channels for node in nodes):
+            raise self.bad("no joint has channels")
+        bones = [node.offset for node in nodes if node.parent >= 0]
+        moved = any(kind == "position" for n in nodes if n.parent >= 0 for kind, _ in n.channels or ())
+        if bones and not moved and not np.any(bones):
+            raise FileError(self.what, "all its bones have length zero", "Export the clip with its skeleton.")
+        return nodes
