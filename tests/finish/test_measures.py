@@ -156,3 +156,9 @@ def test_a_pose_that_glides_below_a_root_that_stays_is_no_life(cmu_walk):
     placed = np.concatenate([np.zeros((len(still), 1, 3)), cmu_walk.translation[:, :1]], axis=1)
     clip = Clip(rig, turned, placed, 30.0, translated=(0, 1))
     assert notes.liveliness(clip, Gap(75, 135)) < 1e-9
+
+
+def test_at_a_frame_a_second_nothing_tells_how_lively_a_motion_is(cmu_walk):
+    """A single frame beside a gap has no steps: no number comes of it, and no warning."""
+    slow = cmu_walk.positions()[::30]
+    assert measures.liveliness(slow, 2, 5, 1.0) is None

@@ -82,7 +82,7 @@ def liveliness(positions: np.ndarray, start: int, stop: int, fps: float) -> floa
     second, quarter = round(fps), (stop - start) // 4
     lo, hi = max(0, start - second), min(len(positions), stop + second)
     sides = [side for side in ((lo, start), (stop, hi)) if side[0] < side[1]]
-    if stop - start < second or not sides or min(b - a for a, b in sides) < second / 2:
+    if stop - start < second or not sides or min(b - a for a, b in sides) < max(second / 2, 2):
         return None
     around = float(np.mean([_stir(positions[a:b]) for a, b in sides]))
     if around * fps < STIRS:
