@@ -84,7 +84,7 @@ def fill(
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
             to hold it there. May be repeated.
         output: where to write the filled clip; the report goes beside it. Of several clips a folder.
-        method: what fills the gaps: auto (the default), cae, spline, ...; `interpose models` lists them.
+        method: what fills the gaps: auto (the default), base, spline, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         max_gap: leave gaps of more than so many frames open, or seconds, 3s, and list them.
         only_gap: fill only the gap of this number, counted from 1 in order of time. May be repeated.

@@ -55,7 +55,7 @@ def forecast(
         seed: of what is drawn at random. One sample without it is the most likely one.
         temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
         output: where to write the clip; the report goes beside it.
-        method: how it is continued: auto (the default), cae, linear, ...; `interpose models` lists them.
+        method: how it is continued: auto (the default), base, stmi-gan, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         player: write a page (take.forecast.html) that plays all samples; it opens in any browser.
         json: print the report as JSON.

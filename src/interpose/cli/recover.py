@@ -60,7 +60,7 @@ def recover(
             Feet that stand tell it. Without --frames it begins where the first frame is.
         frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
         output: where to write the clip; the report goes beside it. Of several clips a folder.
-        method: what recovers them: auto (the default), cae, spline, ... `interpose models` lists them.
+        method: what recovers them: auto (the default), base, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (take.recovered.html) that plays the result; it opens in any browser.

@@ -92,7 +92,7 @@ def stitch(
             walk, and generate a few frames alone.
         action: what the generated motion is; `interpose models base` lists what there is.
         output: where to write the clip; the report goes beside it.
-        method: what generates it: auto (the default), cae, spline, ... `interpose models` lists them.
+        method: what generates it: auto (the default), base, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         seed: for methods that sample.
         player: write a page (walk.stitched.html) that plays the result; it opens in any browser.

@@ -35,7 +35,8 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
         raise FileError(
             f"there is no folder {folder}", "clips are looked for in a folder", "Name it with --data."
         )
-    for path in sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS):
+    paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS)
+    for path in paths:
         name = str(path.relative_to(folder))
         if path.with_suffix(".json").exists():
             progress(f"left out: {name} (a .json lies beside it, as beside what interpose makes)")
@@ -52,7 +53,7 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
     if not found:
         raise FileError(
             f"no clips to learn from in {folder}",
-            f"none of its files ({', '.join(FORMATS)}) could be used",
+            "none of its clips could be used" if paths else f"it holds no clip ({', '.join(FORMATS)})",
             "Name a folder of whole, clean takes.",
         )
     parts, performers = [], dict[tuple[object, ...], str]()
