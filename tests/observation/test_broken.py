@@ -115,6 +115,25 @@ def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
     assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 
 
+@pytest.mark.parametrize("frames", [12, 30, 80])
+@pytest.mark.parametrize("start", [15, 60, 120])
+def test_who_walks_on_while_he_is_somewhere_else_is_found(cmu_walk, start, frames):
+    """He comes back to elsewhere, but by the jump that undoes the first one."""
+    translation = cmu_walk.translation.copy()
+    translation[start : start + frames, 0] += [0.2, 0.05, -0.2]
+    lost = ~broken(cmu_walk.with_motion(cmu_walk.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[frame, 0] for frame in range(start, start + frames)]
+
+
+def test_who_runs_on_while_he_is_somewhere_else_is_found(data):
+    """His steps are as long as what he is put aside."""
+    clip = formats.load(data / "cmu_run.bvh")
+    translation = clip.translation.copy()
+    translation[14:18, 0] += [0.15, 0.0, 0.1]
+    lost = ~broken(clip.with_motion(clip.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[frame, 0] for frame in range(14, 18)]
+
+
 @pytest.mark.parametrize("run", [1, 2, 3])
 @pytest.mark.parametrize("way", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.2, 0.2, -0.1)])
 def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
