@@ -146,6 +146,19 @@ def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
         assert np.flatnonzero(lost).tolist() == [*range(start, start + run)]
 
 
+def test_the_place_that_is_held_while_a_body_is_lost_is_lost(cmu_walk):
+    """In the rest pose where he was, by a tracker that saw nobody; not of who is animated on the spot, nor
+    while the hips are known."""
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[60:80], translation[60:80] = cmu_walk.skeleton.rest_rotation, translation[59]
+    seen = broken(cmu_walk.with_motion(rotation, translation))
+    assert np.flatnonzero(~seen.translation[:, 0]).tolist() == [*range(60, 80)]
+    on_the_spot = np.repeat(translation[:1], len(translation), axis=0)
+    assert broken(cmu_walk.with_motion(rotation, on_the_spot)).translation.all()
+    rotation[60:80, 0] = cmu_walk.rotation[60:80, 0]
+    assert broken(cmu_walk.with_motion(rotation, translation)).translation.all()
+
+
 def test_a_long_rest_pose_is_no_snap(cmu_walk):
     rotation = cmu_walk.rotation.copy()
     arm = cmu_walk.skeleton.index("LeftArm")

@@ -15,7 +15,7 @@ from interpose.geometry.time import runs, sample, sample_rotations
 from interpose.observation.corruption import LIMBS
 from interpose.observation.observation import Observation
 from interpose.skeletons import SIDES, find_mapping
-from interpose.skeletons.carrier import placed
+from interpose.skeletons.carrier import hips_of, placed
 
 # A value is the rest pose if it differs by less (radians, metres): files keep seven digits or so.
 SAME = 1e-5
@@ -72,7 +72,7 @@ def broken(clip: Clip) -> Observation:
     places = clip.translation[:, [clip.translated.index(joint) for joint in placing]]
     homes = [skeleton.rest_translation[placing], np.zeros((len(placing), 3))]
     gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps)
-    seen.translation[:, placing] = ~(gone | away | spikes)
+    seen.translation[:, placing] = ~(gone | away | spikes | _left(places, snaps[:, hips_of(skeleton)]))
     again = (np.diff(snaps, axis=0, prepend=False) & snaps).sum(axis=0) >= MANY
     return _smoother(clip, seen, snaps & again)
 
@@ -161,6 +161,14 @@ def _exchanged(clip: Clip, away: np.ndarray) -> np.ndarray:
         left, right = (away[:, side].any(axis=1, keepdims=True) for side in both)
         found[:, both[0] + both[1]] |= left & right
     return found
+
+
+def _left(places: np.ndarray, snaps: np.ndarray) -> np.ndarray:
+    """(F, P) where places (F, P, 3) that move elsewhere are left as they were, to the last digit, while the
+    hips snap to the rest pose (F,): a tracker that loses a body holds its place."""
+    held = np.abs(np.diff(places, axis=0)).max(axis=-1) < SAME
+    elsewhere = ~held[~snaps[1:]].all(axis=0)
+    return np.pad(held & snaps[1:, None] & elsewhere, ((1, 0), (0, 0)))
 
 
 def _apart(a: np.ndarray, b: np.ndarray) -> np.ndarray:
