@@ -38,6 +38,18 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+@pytest.mark.parametrize("joint", ["RightForeArm", "LeftForeArm", "Head"])
+def test_of_a_spike_that_rises_and_falls_the_first_and_last_frame_are_found(cmu_walk, joint):
+    """Filters make such of one frame. Without their ends what is left leads from one to the other."""
+    rotation, column = cmu_walk.rotation.copy(), cmu_walk.skeleton.index(joint)
+    for start in (40, 100, 160):
+        bell = 1.5 * np.sin(np.pi * np.arange(1, 5) / 5)
+        part = slice(start, start + 4)
+        rotation[part, column] = rotations.multiply(rotation[part, column], rotations.about("X", bell))
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.flatnonzero(lost[:, column]).tolist() == [s + i for s in (40, 100, 160) for i in range(4)]
+
+
 def test_what_rises_to_its_height_is_motion(cmu_walk):
     """Toes that push off, at 30 fps: there and back within five frames."""
     rotation, toes = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftToeBase")

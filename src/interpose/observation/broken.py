@@ -254,7 +254,21 @@ def _spikes(values: np.ndarray, far: float, second: int) -> tuple[np.ndarray, np
             way = _apart(own[stop], own[start - 1])
             if way > BACK * height + (stop - start + 1) * usual:
                 spikes[start:stop] = False
+    for start, stop in runs(spikes):
+        if start > 2 and stop < len(own) - 2:
+            # Of one that rises and falls the medians beside it are its own first and last frames.
+            bend = _bend(own, start, stop)
+            wider = 2.0 * bend > far and _bend(own, start - 1, stop + 1) < BACK * bend
+            spikes[start - wider : stop + wider] = True
     return spikes, middle
+
+
+def _bend(values: np.ndarray, start: int, stop: int) -> float:
+    """By how much the way over the frames start to stop - 1 differs, a frame, from the steps of values (F, d)
+    that lead to it and from it."""
+    across = (values[stop] - values[start - 1]) / (stop - start + 1)
+    beside = values[[start - 1, stop + 1]] - values[[start - 2, stop]]
+    return float(np.linalg.norm(beside - across, axis=-1).sum())
 
 
 def _hops(places: np.ndarray, far: float) -> np.ndarray:
