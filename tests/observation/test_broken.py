@@ -38,6 +38,18 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+@pytest.mark.parametrize("joint", ["RightForeArm", "LeftForeArm", "Head"])
+def test_of_a_spike_that_rises_and_falls_the_first_and_last_frame_are_found(cmu_walk, joint):
+    """Filters make such of one frame. Without their ends what is left leads from one to the other."""
+    rotation, column = cmu_walk.rotation.copy(), cmu_walk.skeleton.index(joint)
+    for start in (40, 100, 160):
+        bell = 1.5 * np.sin(np.pi * np.arange(1, 5) / 5)
+        part = slice(start, start + 4)
+        rotation[part, column] = rotations.multiply(rotation[part, column], rotations.about("X", bell))
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.flatnonzero(lost[:, column]).tolist() == [s + i for s in (40, 100, 160) for i in range(4)]
+
+
 def test_what_rises_to_its_height_is_motion(cmu_walk):
     """Toes that push off, at 30 fps: there and back within five frames."""
     rotation, toes = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftToeBase")
@@ -115,6 +127,25 @@ def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
     assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 
 
+@pytest.mark.parametrize("frames", [12, 30, 80])
+@pytest.mark.parametrize("start", [15, 60, 120])
+def test_who_walks_on_while_he_is_somewhere_else_is_found(cmu_walk, start, frames):
+    """He comes back to elsewhere, but by the jump that undoes the first one."""
+    translation = cmu_walk.translation.copy()
+    translation[start : start + frames, 0] += [0.2, 0.05, -0.2]
+    lost = ~broken(cmu_walk.with_motion(cmu_walk.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[frame, 0] for frame in range(start, start + frames)]
+
+
+def test_who_runs_on_while_he_is_somewhere_else_is_found(data):
+    """His steps are as long as what he is put aside."""
+    clip = formats.load(data / "cmu_run.bvh")
+    translation = clip.translation.copy()
+    translation[14:18, 0] += [0.15, 0.0, 0.1]
+    lost = ~broken(clip.with_motion(clip.rotation, translation)).translation
+    assert np.argwhere(lost).tolist() == [[frame, 0] for frame in range(14, 18)]
+
+
 @pytest.mark.parametrize("run", [1, 2, 3])
 @pytest.mark.parametrize("way", [(0.3, 0.0, 0.0), (0.0, -0.3, 0.0), (0.2, 0.2, -0.1)])
 def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
@@ -125,6 +156,19 @@ def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
         translation[start : start + run, 0] += way
         lost = ~broken(clip.with_motion(clip.rotation, translation)).translation[:, 0]
         assert np.flatnonzero(lost).tolist() == [*range(start, start + run)]
+
+
+def test_the_place_that_is_held_while_a_body_is_lost_is_lost(cmu_walk):
+    """In the rest pose where he was, by a tracker that saw nobody; not of who is animated on the spot, nor
+    while the hips are known."""
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[60:80], translation[60:80] = cmu_walk.skeleton.rest_rotation, translation[59]
+    seen = broken(cmu_walk.with_motion(rotation, translation))
+    assert np.flatnonzero(~seen.translation[:, 0]).tolist() == [*range(60, 80)]
+    on_the_spot = np.repeat(translation[:1], len(translation), axis=0)
+    assert broken(cmu_walk.with_motion(rotation, on_the_spot)).translation.all()
+    rotation[60:80, 0] = cmu_walk.rotation[60:80, 0]
+    assert broken(cmu_walk.with_motion(rotation, translation)).translation.all()
 
 
 def test_a_long_rest_pose_is_no_snap(cmu_walk):

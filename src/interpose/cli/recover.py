@@ -39,7 +39,7 @@ def recover(
     """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
 
     Without --joints it finds what drops out: joints that snap to their rest
-    pose, or jump away and back within a second, and spikes, at any frames; arms
+    pose, or jump away and back within moments, and spikes, at any frames; arms
     or legs that were taken for each other, or bend the other way; and hips that
     stay where they are while they turn. What else is missing is listed, and `interpose fill` fills it.
 
@@ -95,7 +95,7 @@ def recover(
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
         raise NothingError(
             f"there is nothing to recover in {file}",
-            "no joint snaps to its rest pose, spikes, changes sides, or jumps away and back within a second",
+            "no joint snaps to its rest pose, spikes, changes sides, or jumps away and back within moments",
             f"interpose fill {file} fills what else is missing." if others else fix,
             f"{len(others)} gaps, which `interpose fill` fills" if others else "",
             4 if others else 0,

@@ -114,8 +114,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       that stops from one frame to the next.
     - "frozen body": the same, and the hips do not turn either, nor whichever of the listed joints, while
       something else goes on: fingers, a prop, somebody else. `recover` restores both at once.
-    - "lost": joints that snap to their rest pose, or jump away and back, for up to a second, or spikes of up
-      to three frames: what `recover` restores.
+    - "lost": joints that snap to their rest pose, or jump away and back, for up to a second (where the body
+      is, for up to three), or spikes of up to three frames: what `recover` restores.
     - "exchanged": arms, or legs, that have each other's turns for a while, hands and fingers with them where
       they do: `recover` puts them back.
     - "flipped": a thigh and its shin, or an arm, that are turned by half a turn about the line between their
