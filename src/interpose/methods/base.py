@@ -42,9 +42,9 @@ STEP, MEET = 10, 30
 # Where more are left, ends that know nothing of each other would stray, and the body would run in between:
 # its hips are led along a straight line, which is known as far as what is noisy.
 ASTRAY, ROUGHLY = 180, 0.5
-# What weights count for that are asked beside others: `small` had far more steps for lost joints and
-# forecasts than `base`. On 20 windows of validation performers halves are 2 % worse there, 5 % in forecasts,
-# and no better elsewhere; `small` alone is 3 to 5 % worse in gaps of the whole pose.
+# What weights count for that are asked beside others: `small` had far more steps for lost joints than `base`.
+# On 16 windows of validation performers halves are 1 % worse there, and 1 % better in gaps of the whole pose;
+# `small` alone is 1 to 5 % worse in these.
 BESIDE = 2 / 3
 COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
 
