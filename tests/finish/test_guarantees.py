@@ -105,22 +105,26 @@ def test_no_pop_at_seams(walk, make, start):
     known = gaps_of(walk, (start, start + 24))
     done = complete(walk, known, make(walk))
     [report] = done.report.gaps
-    limit = seams.limit(walk, known)
-    jump = measures.seam_jump(done.clip.positions(), [start - 1, start + 24])
-    assert report.seam_after == pytest.approx(100 * jump)
-    assert report.seam_limit == pytest.approx(100 * limit)
-    assert jump <= limit
+    limits = seams.limits(walk, known)
+    jumps = measures.acceleration(done.clip.positions())[[start - 2, start + 23]]
+    _, nearest = np.unravel_index((jumps / limits).argmax(), jumps.shape)
+    assert report.seam_after == pytest.approx(100 * jumps[:, nearest].max())
+    assert report.seam_limit == pytest.approx(100 * limits[nearest])
+    assert (jumps <= limits).all()
     # Noise may put a foot into a shin, and interpolation drags feet along, which is said, too.
     others = [note for note in report.notes if " cm into the " not in note and "while it stands" not in note]
     assert report.method == "spline" or not others
 
 
-def test_limit_is_the_percentile_of_observed_motion_only(walk):
+def test_limits_are_the_percentiles_of_observed_motion_only(walk):
+    """A foot that lands may jump as it does elsewhere; what hardly jumps may as far as all joints."""
     known = gaps_of(walk, (40, 80))
     jumps = measures.acceleration(walk.positions())
-    pooled = np.concatenate([jumps[:38], jumps[80:]])
-    assert seams.limit(walk, known) == pytest.approx(np.percentile(pooled, 95), rel=1e-5)
-    assert seams.limit(walk, gaps_of(walk, (0, 120))) is None
+    seen = np.concatenate([jumps[:38], jumps[80:]])
+    each, pooled = np.percentile(seen, 95, axis=0), np.percentile(seen, 95)
+    assert each.min() < pooled < each.max()
+    assert seams.limits(walk, known) == pytest.approx(np.maximum(each, pooled), rel=1e-5)
+    assert seams.limits(walk, gaps_of(walk, (0, 120))) is None
 
 
 def test_spline_that_fits_stays_what_it_is(walk):
@@ -232,7 +236,7 @@ class Trembling(Linear):
 
     def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
         raw = super().complete(clip, observation, seed)
-        turns = np.where(np.arange(len(clip)) % 2, 0.3, -0.3)[:, None]
+        turns = np.where(np.arange(len(clip)) % 2, 0.14, -0.14)[:, None]
         rotation = rotations.multiply(raw.clip.rotation, rotations.about("X", turns))
         return Raw(raw.clip.with_motion(rotation, raw.clip.translation))
 

@@ -97,9 +97,8 @@ def _show(clip: Clip, out: Path, name: str) -> None:
         right=("seam", "bones", "foot slide", "foot travel", "error"),
     )
     say(
-        "seam: largest velocity jump at the ends, cm/frame^2; the filled one has to stay below "
-        f"{filled.report.gaps[0].seam_limit or 0:.2f},\n"
-        "  under which 95 of 100 jumps of the clip itself are: real motion can be above\n"
+        "seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit: what 95 of 100 of\n"
+        "  its own in the clip are below, and real motion can be above\n"
         "bones: largest change of a length; error: mean distance of all joints from what was taken away",
         style="dim",
     )
@@ -116,6 +115,7 @@ def _show(clip: Clip, out: Path, name: str) -> None:
 
 
 def _row(name: str, clip: Clip, done: Completion, gap: Gap) -> list[str]:
+    from interpose.cli.outputs import seam
     from interpose.finish.measures import joint_error
 
     inside = slice(gap.start, gap.stop)
@@ -123,7 +123,7 @@ def _row(name: str, clip: Clip, done: Completion, gap: Gap) -> list[str]:
     one = done.report.gaps[0]
     return [
         name,
-        f"{one.seam_after or 0:.2f}",
+        seam(one.seam_after, one.seam_limit),
         f"{one.bone_deviation:.2f} cm",
         f"{one.foot_slide or 0:.1f} cm/s",
         f"{one.foot_travel or 0:.2f} m",
@@ -135,12 +135,13 @@ def _truth(clip: Clip, gap: Gap) -> list[str]:
     """The same measures of what was taken away."""
     import numpy as np
 
-    from interpose.finish import feet
-    from interpose.finish.measures import seam_jump
+    from interpose.cli.outputs import seam
+    from interpose.finish import feet, jumps, seams
     from interpose.observation import Observation
 
     seen = Observation.from_gaps(clip, [gap])
     slide, travel = feet.measure(clip, seen, gap.start, gap.stop) or (0.0, 0.0)
-    ends = np.array([gap.start - 1, gap.stop])  # as in the report of a gap
-    jump = 100 * seam_jump(clip.positions(), ends)
-    return ["truth", f"{jump:.2f}", "0.00 cm", f"{slide:.1f} cm/s", f"{travel:.2f} m", "0.0 cm"]
+    limits = seams.limits(clip, seen)
+    bounds = None if limits is None else jumps.Bounds(limits, np.inf)
+    jump, limit = (100 * (one or 0.0) for one in jumps.beside(clip, seen, gap, bounds) or (0.0, 0.0))
+    return ["truth", seam(jump, limit), "0.00 cm", f"{slide:.1f} cm/s", f"{travel:.2f} m", "0.0 cm"]

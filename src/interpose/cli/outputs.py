@@ -321,14 +321,18 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
 def _legend(gaps: list[GapReport]) -> Iterator[str]:
     """What the columns mean, of those that are there."""
     if any(gap.seam_after is not None for gap in gaps):
-        limit = gaps[0].seam_limit
-        usual = "" if limit is None else f"; 95 of 100 of the clip's own are below {limit:.2f}"
-        yield f"seam: largest velocity jump at the ends, cm/frame^2{usual}"
+        usual = "" if gaps[0].seam_limit is None else ": what 95 of 100 of its own are below"
+        yield f"seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit{usual}"
     yield "bones: largest change of a length, cm"
     if any(gap.foot_slide is not None for gap in gaps):
         yield "slide, travel: of the feet, cm/s and m"
     if any(gap.drift is not None for gap in gaps):
         yield "drift: of the way before it was evened out, cm"
+
+
+def seam(jump: float | None, limit: float | None) -> str:
+    """A velocity jump and how far it may go, "1.05 of 2.56"."""
+    return figure(jump) if limit is None else f"{figure(jump)} of {figure(limit)}"
 
 
 def _row(gap: GapReport, fps: float) -> list[str]:
@@ -339,7 +343,7 @@ def _row(gap: GapReport, fps: float) -> list[str]:
         seconds(gap.stop - gap.start, fps),
         joints,
         gap.method if gap.model is None or gap.model == gap.method else f"{gap.method} ({gap.model})",
-        figure(gap.seam_after),
+        seam(gap.seam_after, gap.seam_limit),
         figure(gap.bone_deviation),
         figure(gap.foot_slide, 1),
         figure(gap.foot_travel),

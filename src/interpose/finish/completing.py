@@ -38,7 +38,7 @@ def complete(
     method: Method,
     seed: int | None = None,
     fallback: Method | None = None,
-    limit: float | None = None,
+    limits: np.ndarray | None = None,
     path: Mapping[int, np.ndarray] | None = None,
     first: int = 0,
 ) -> Completion:
@@ -54,8 +54,8 @@ def complete(
         method: what completes it.
         seed: for methods that sample.
         fallback: the simpler method.
-        limit: metres per frame squared, the largest velocity jump allowed at a seam, when `clip` is a window
-            of a longer one. Default: the 95th percentile of the clip's own.
+        limits: (J,) metres per frame squared, the largest velocity jumps allowed at a seam, when `clip` is a
+            window of a longer one. Default: the clip's own, see `seams.limits`.
         path: x and z in metres that the hips are to be over, by frame; inside of gaps of the whole pose.
         first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
@@ -64,7 +64,7 @@ def complete(
             point of the path lies in no gap of the whole pose with known frames on both sides.
     """
     observation.check(clip)
-    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limit, first), path)
+    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limits, first), path)
 
 
 def _complete(

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, jumps, measures, notes, penetration, seams
+from interpose.finish import feet, jumps, measures, notes, penetration
 from interpose.finish.report import GapReport, Provenance
 from interpose.finish.span import Span
 from interpose.geometry import rotations
@@ -22,7 +22,7 @@ def gap_report(
     span: Span,
     raw: Raw,
     error: np.ndarray | None,
-    before: float | None,
+    before: tuple[float, float | None] | None,
     bounds: jumps.Bounds | None,
     unheld: tuple[float, float] | None,
     held: tuple[float, float] | None,
@@ -34,7 +34,7 @@ def gap_report(
     skeleton = finished.skeleton
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
-    after = jumps.largest(finished, known, jumps.beside(gap), seams.seam_jumps)
+    after = jumps.beside(finished, known, gap, bounds)
     alive = None if gap.joints is not None else notes.liveliness(finished, gap)
     glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
@@ -53,9 +53,9 @@ def gap_report(
         model=raw.notes.get("model") if own else None,
         weights=raw.notes.get("weights", ()) if own else (),
         solve_error=_centi(solved),
-        seam_before=_centi(before),
-        seam_after=_centi(after),
-        seam_limit=_centi(bounds.seam if bounds else None),
+        seam_before=_centi(before[0] if before else None),
+        seam_after=_centi(after[0] if after else None),
+        seam_limit=_centi(after[1] if after else None),
         peak=_centi(jumps.largest(finished, known, np.arange(gap.start, gap.stop))),
         peak_limit=_centi(bounds.peak if bounds else None),
         bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),

@@ -39,7 +39,7 @@ class Ask:
     method: Method
     seed: int | None
     fallback: Method
-    limit: float | None
+    limits: np.ndarray | None
     first: int
 
 
@@ -76,7 +76,7 @@ class _Work:
         raw: what the method said; `opinion` the same as rotations, `error` (F,) how far these are from it.
         current: the clip as far as it is.
         bounds: how far velocities may jump; None where nothing is known to compare with.
-        before: the largest velocity jump beside each gap as the method left it.
+        before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
         mended: the frames of spans over which a spline leads, by the span's first.
     """
@@ -113,13 +113,11 @@ class _Work:
                 opinion = merge(opinion, hidden, stays)
         self.opinion = held(opinion, self.clip.source)
         self.current = merge(self.opinion, hidden, known)
-        limit = seams.limit(hidden, known) if ask.limit is None else ask.limit
+        limits = seams.limits(hidden, known) if ask.limits is None else ask.limits
         self.bounds = None
-        if limit is not None:
-            self.bounds = jumps.Bounds(limit, jumps.peak_limit(hidden, known, limit))
-        self.before = {
-            gap: jumps.largest(self.current, known, jumps.beside(gap), seams.seam_jumps) for gap in self.gaps
-        }
+        if limits is not None:
+            self.bounds = jumps.Bounds(limits, jumps.peak_limit(hidden, known, float(limits.max())))
+        self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
 
     def look(self) -> None:
         """Say of spans what is wrong with the method's motion, and where it was not the method's to say."""
@@ -150,10 +148,11 @@ class _Work:
             if not (own and layer and layer.stands):
                 _plant(current, self.firm, span, self.bounds, self.raw.stands if own else None)
                 _lift(current, self.firm, span)
-        limit = None if self.bounds is None else self.bounds.seam
+        if self.bounds is None:
+            return
         for _ in range(ROUNDS):
             for span in chosen:
-                jumps.soften(current, self.firm, span, limit)
+                jumps.soften(current, self.firm, span, self.bounds.seam)
 
     def fall_back(self) -> None:
         """Let the simpler method fill the spans in which the method's motion does not do, where it does

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,10 +30,10 @@ KINK = 8.0
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far velocities may jump, in metres per frame squared: at seams, inside of gaps, and what the
-    observed motion itself does."""
+    """How far velocities may jump, in metres per frame squared: at seams, by joint (J,), inside of gaps, and
+    what the observed motion itself does."""
 
-    seam: float
+    seam: np.ndarray
     peak: float
 
     @property
@@ -43,28 +41,27 @@ class Bounds:
         return self.peak / seams.OWN_PEAKS
 
 
-def largest(
-    clip: Clip,
-    known: Observation,
-    frames: np.ndarray,
-    jumps: Callable[[Clip, Observation, np.ndarray], np.ndarray] = seams.jumps,
-) -> float | None:
+def largest(clip: Clip, known: Observation, frames: np.ndarray) -> float | None:
     """The largest velocity jump at some frames, in metres per frame squared; None where there are none."""
     frames = frames[(frames > 0) & (frames < len(clip) - 1)]
     if frames.size == 0:
         return None
-    return float(np.linalg.norm(jumps(clip, known, frames), axis=-1).max())
+    return float(np.linalg.norm(seams.jumps(clip, known, frames), axis=-1).max())
 
 
-def beside(gap: Gap) -> np.ndarray:
-    """The known frames at both ends of a gap."""
-    return np.array([gap.start - 1, gap.stop])
-
-
-def at_seams(current: Clip, known: Observation, span: Span) -> float | None:
-    """The largest velocity jump at the seams of a span."""
-    edges = seams.edges(known, current.translated, (span.start, span.stop))
-    return largest(current, known, edges, seams.seam_jumps)
+def beside(
+    clip: Clip, known: Observation, gap: Gap, bounds: Bounds | None
+) -> tuple[float, float | None] | None:
+    """The velocity jump beside a gap of the joint that comes nearest to its limit, or goes furthest beyond,
+    and that limit, in metres per frame squared; of the one that jumps furthest where there are no limits
+    (None). None where the gap has no seam."""
+    frames = np.array([frame for frame in (gap.start - 1, gap.stop) if 0 < frame < len(clip) - 1], int)
+    if not frames.size:
+        return None
+    size = np.linalg.norm(seams.seam_jumps(clip, known, frames), axis=-1)
+    limits = np.ones(size.shape[1]) if bounds is None else bounds.seam
+    row, joint = np.unravel_index((size / limits).argmax(), size.shape)
+    return float(size[row, joint]), None if bounds is None else float(limits[joint])
 
 
 def peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
@@ -85,20 +82,21 @@ def excess(
     """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
     words, and at which frame; words call the first frame `first`."""
     # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
-    bounds = bounds or Bounds(math.inf, TORN / current.fps**2)
-    found, names = [(0.0, "", span.start)], current.skeleton.names
+    names = current.skeleton.names
+    bounds = bounds or Bounds(np.full(len(names), np.inf), TORN / current.fps**2)
+    found = [(0.0, "", span.start)]
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
     for frames, jumps, most, where in (
         (edges, seams.seam_jumps, bounds.seam, "at a seam"),
-        (inside, seams.jumps, bounds.peak, "inside the gap"),
+        (inside, seams.jumps, np.full(len(names), bounds.peak), "inside the gap"),
     ):
         if frames.size:
             size = np.linalg.norm(jumps(current, known, frames), axis=-1)
-            row, joint = np.unravel_index(size.argmax(), size.shape)
-            jump, frame = float(size[row, joint]), int(frames[row])
-            words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * most:.2f}"
-            found.append((jump / most, f"{words} ({names[joint]}, frame {first + frame})", frame))
+            row, joint = np.unravel_index((size / most).argmax(), size.shape)
+            jump, limit, frame = float(size[row, joint]), float(most[joint]), int(frames[row])
+            words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
+            found.append((jump / limit, f"{words} ({names[joint]}, frame {first + frame})", frame))
     return max(found)
 
 
@@ -150,11 +148,14 @@ def _led_over(
     return min(found, key=lambda one: one[0])[1:]
 
 
-def soften(current: Clip, known: Observation, span: Span, limit: float | None) -> None:
-    """Bring the jumps at the seams of a span below the limit (metres per frame squared)."""
-    jump = at_seams(current, known, span)
-    if limit is None or jump is None or not limit < jump < KINK / current.fps:
+def soften(current: Clip, known: Observation, span: Span, limits: np.ndarray) -> None:
+    """Bring the jumps at the seams of a span below the limits (J,) of joints (metres per frame squared)."""
+    edges = seams.edges(known, current.translated, (span.start, span.stop))
+    if not edges.size:
+        return
+    size = np.linalg.norm(seams.seam_jumps(current, known, edges), axis=-1)
+    if not (size > limits).any() or size.max() >= KINK / current.fps:
         return
     lo, hi, inner = span.around(len(current), 2)
-    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limit)
+    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limits)
     write(current, softer, span.start, inner)

@@ -31,18 +31,6 @@ def acceleration(positions: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1)
 
 
-def seam_jump(positions: np.ndarray, frames: np.ndarray) -> float:
-    """The largest velocity jump of any joint at `frames`, in metres per frame squared.
-
-    positions: (F, J, 3). Frames without a neighbour on both sides have none; NaN when that leaves no frame.
-    """
-    frames = np.asarray(frames, int)
-    frames = frames[(frames > 0) & (frames < len(positions) - 1)]
-    if frames.size == 0:
-        return float("nan")
-    return float(acceleration(positions)[frames - 1].max())
-
-
 def bone_deviation(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> float:
     """Largest difference in metres between a bone's length in any frame and what it should be.
 

@@ -39,12 +39,13 @@ class GapReport:
         model: the trained model, if the method has one.
         weights: of all trained models that were asked, with name, licence and commit.
         solve_error: cm, mean distance of the solved pose from the positions that the method gave.
-        seam_before, seam_after: cm a frame squared, the largest velocity jump of any joint at the seams, of
-            what the method said and of what is returned.
-        seam_limit: cm a frame squared, the 95th percentile of the clip's own velocity jumps.
+        seam_before, seam_after: cm a frame squared, the velocity jump at the seams of the joint that comes
+            nearest to its limit, or goes furthest beyond, of what the method said and of what is returned.
+        seam_limit: cm a frame squared, the limit of the latter: the 95th percentile of the joint's own
+            velocity jumps in the clip, and at least that of all joints.
         peak: cm a frame squared, the largest velocity jump of any joint inside the gap.
         peak_limit: cm a frame squared, what it may be: twice the largest one of the observed motion around
-            the gap, or eight seam limits, or what a person does who sets off.
+            the gap, or three times the largest limit of a joint at seams, or what a person does who sets off.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.

@@ -28,12 +28,12 @@ MOMENT = 0.05
 ABSURD = 0.5
 # Below this a difference in a local rotation (radians) or translation (metres) is none.
 EXACT = 1e-6
-# The limit of velocity jumps: a percentile of the clip's own, and at least this, in metres per second squared
-# (1 mm a frame squared at 30 fps).
+# The limit of velocity jumps: a percentile of the joint's own, and at least this, in metres per second
+# squared (1 mm a frame squared at 30 fps).
 PERCENTILE, FLOOR = 95.0, 0.9
-# Inside a gap no joint jumps further than so many limits, or than so many times the largest jump of the
-# observed motion around it. On validation performers 98 of 100 gaps of true motion keep to it.
-PEAKS, OWN_PEAKS = 8.0, 2.0
+# Inside a gap no joint jumps further than so many times the largest limit, or than so many times the largest
+# jump of the observed motion around it. On validation performers 98 of 100 gaps of true motion keep to it.
+PEAKS, OWN_PEAKS = 3.0, 2.0
 # A jump that is brought below the limit is brought to this share of it.
 MARGIN = 0.85
 CHUNK = 4096
@@ -53,28 +53,38 @@ def edges(known: Observation, translated: tuple[int, ...], span: tuple[int, int]
     return np.array(sorted(f for f in found if 0 < f < len(known.rotation) - 1), int)
 
 
-def limit(clip: Clip, observation: Observation) -> float | None:
-    """The 95th percentile of the clip's own velocity jumps, in metres per frame squared.
+def limits(clip: Clip, observation: Observation) -> np.ndarray | None:
+    """(J,) how far the velocity of each joint may jump at seams, in metres per frame squared.
 
-    None when none are observed, as between lone keys.
+    The 95th percentile of the joint's own velocity jumps, and at least that of all joints pooled: feet that
+    land, and hands, jump three times as far as the rest of a body, which tells nothing of its hips. None when
+    none are observed, as between lone keys.
     """
     own = own_jumps(clip, observation)
-    return max(float(np.percentile(own, PERCENTILE)), FLOOR / clip.fps**2) if own.size else None
+    if not own.size:
+        return None
+    pooled = max(float(np.percentile(own[np.isfinite(own)], PERCENTILE)), FLOOR / clip.fps**2)
+    most = np.full(own.shape[1], pooled)
+    for joint in np.flatnonzero(np.isfinite(own).any(axis=0)):
+        told = own[np.isfinite(own[:, joint]), joint]
+        most[joint] = max(float(np.percentile(told, PERCENTILE)), pooled)
+    return most
 
 
 def own_jumps(clip: Clip, observation: Observation) -> np.ndarray:
-    """(n,) the clip's own velocity jumps, in metres per frame squared.
+    """(n, J) the clip's own velocity jumps, in metres per frame squared.
 
-    Of all joints in all frames in which their position is observed together with both neighbours'.
+    Of the frames in which the position of a joint is observed together with both neighbours'; NaN for joints
+    of which it is not.
     """
-    pooled = [np.empty(0, np.float32)]
+    pooled = [np.empty((0, len(clip.skeleton)), np.float32)]
     for start in range(0, max(len(clip) - 2, 0), CHUNK):
         stop = min(start + CHUNK + 2, len(clip))
         known = observation.slice(start, stop).positions(clip.skeleton)
         known = known[:-2] & known[1:-1] & known[2:]
         if known.any():
             part = measures.acceleration(_bare(clip, observation, start, stop).positions())
-            pooled.append(part[known].astype(np.float32))
+            pooled.append(np.where(known, part, np.nan)[known.any(axis=1)].astype(np.float32))
     return np.concatenate(pooled)
 
 
@@ -169,18 +179,19 @@ def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
 
 
-def soften(motion: Clip, known: Observation, span: tuple[int, int], limit: float) -> Clip:
-    """Bring velocity jumps at the seams of the span below the limit (metres per frame squared).
+def soften(motion: Clip, known: Observation, span: tuple[int, int], limits: np.ndarray) -> Clip:
+    """Bring velocity jumps at the seams of the span below the limits (J,), metres per frame squared.
 
     The first missing pose is turned, as little as possible, so that joints that jump too far go on more like
     they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
     """
     at = edges(known, motion.translated, span)
     jump = seam_jumps(motion, known, at)
-    size = np.linalg.norm(jump, axis=-1, keepdims=True)
-    excess = jump * np.maximum(1 - MARGIN * limit / np.maximum(size, 1e-12), 0) * (size > limit)
-    # Joints far below the limit may give way for those above it.
-    weights = np.where(size[..., 0] > 0.7 * limit, 1.0, 0.05)
+    size = np.linalg.norm(jump, axis=-1)
+    share = np.maximum(1 - MARGIN * limits / np.maximum(size, 1e-12), 0) * (size > limits)
+    excess = jump * share[..., None]
+    # Joints far below their limit may give way for those above it.
+    weights = np.where(size > 0.7 * limits, 1.0, 0.05)
     # Each seam has a pose before and one after it; what is missing in both shares the work.
     edge, way = np.repeat(at, 2), np.tile([-1, 1], len(at))
     first = edge + way

@@ -91,7 +91,7 @@ def fill(
     spans(clip, observation, points)
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
     _check_open(jobs, points)
-    limit = seams.limit(clip, observation) if any(job.method for job in jobs) else None
+    limits = seams.limits(clip, observation) if any(job.method for job in jobs) else None
     work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
     for done, (group, chosen) in enumerate(work):
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
@@ -101,7 +101,7 @@ def fill(
         other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
         led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
         way = {frame - lo: point for frame, point in points.items() if frame in led}
-        part = complete(window, seen, chosen, seed, other, limit=limit, path=way, first=lo - zero)
+        part = complete(window, seen, chosen, seed, other, limits=limits, path=way, first=lo - zero)
         whole.take(part, pieces, lo)
         if progress:
             progress((done + 1) / len(work))

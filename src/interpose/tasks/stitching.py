@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, on_rig_of
+from interpose.finish import Completion, on_rig_of, seams
 from interpose.finish.measures import acceleration
-from interpose.observation import gait, timeline
+from interpose.observation import Observation, gait, timeline
 from interpose.skeletons import find_humanoid
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
@@ -28,8 +28,8 @@ class Loop:
     Attributes:
         placement: how the whole motion is turned and shifted each time it comes round.
         why: what decided the length of the last gap, where nobody said it.
-        jump, limit: cm a frame squared, the largest velocity jump of any joint at frame 0, so placed, after
-            the last two frames; and the 95th percentile of the motion's own.
+        jump, limit: cm a frame squared, the velocity jump at frame 0, so placed, after the last two frames,
+            of the joint that comes nearest to its limit or goes furthest beyond; and that limit, as at seams.
     """
 
     placement: timeline.Placement
@@ -77,10 +77,14 @@ def stitch(
     done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
     clip, provenance, closing = done.clip, done.provenance, None
     if line.again is not None:
-        start, last = line.again.start, done.report.gaps[-1]
+        start = line.again.start
         around = acceleration(clip.slice(start - 1, start + 2).positions())
-        jump = 100 * float(around.max()) if around.size else None
-        closing = Loop(line.again.placement, line.again.why, jump, last.seam_limit)
+        limits = seams.limits(line.clip, Observation.from_gaps(line.clip, line.gaps))
+        jump = limit = None
+        if around.size and limits is not None:
+            joint = int((around[0] / limits).argmax())
+            jump, limit = 100 * float(around[0, joint]), 100 * float(limits[joint])
+        closing = Loop(line.again.placement, line.again.why, jump, limit)
         clip = clip.with_motion(clip.rotation[:start], clip.translation[:start])
         provenance = provenance[:start]
     return Stitched(
