@@ -45,7 +45,7 @@ class GapReport:
             velocity jumps in the clip, and at least that of all joints.
         peak: cm a frame squared, the largest velocity jump of any joint inside the gap.
         peak_limit: cm a frame squared, what it may be: twice the largest one of the observed motion around
-            the gap, or three times the largest limit of a joint at seams, or what a person does who sets off.
+            the gap, or four times the largest limit of a joint at seams, or what a person does who sets off.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.

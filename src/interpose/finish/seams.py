@@ -33,7 +33,7 @@ EXACT = 1e-6
 PERCENTILE, FLOOR = 95.0, 0.9
 # Inside a gap no joint jumps further than so many times the largest limit, or than so many times the largest
 # jump of the observed motion around it. On validation performers 98 of 100 gaps of true motion keep to it.
-PEAKS, OWN_PEAKS = 3.0, 2.0
+PEAKS, OWN_PEAKS = 4.0, 2.0
 # A jump that is brought below the limit is brought to this share of it.
 MARGIN = 0.85
 CHUNK = 4096
