@@ -200,10 +200,6 @@ def test_a_joint_that_rest_poses_alone_turn_is_no_finding():
     assert not any("finger" in (one.joints or ()) for one in found if one.kind == "frozen")
 
 
-def test_a_duplicated_frame_is_no_finding():
-    assert scan(hold(motion(), 60, 61, None)) == []
-
-
 def test_missing_values_are_listed_and_not_taken_for_frozen_ones():
     clip = motion()
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
@@ -300,6 +296,27 @@ def test_frames_that_are_there_twice_are_said(cmu_walk, every, real):
     assert f"{real} frames a second, in a file of 30" in found.note
     assert to_gaps([found]) == []
     assert not [one for one in scan(clip) if one.kind == "repeated"]
+
+
+def doubled(clip, *runs):
+    """The clip with frames start to stop - 1 of each run as the one before."""
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    for start, stop in runs:
+        rotation[start:stop], translation[start:stop] = rotation[start - 1], translation[start - 1]
+    return clip.with_motion(rotation, translation)
+
+
+def test_single_frames_that_are_there_twice_are_gaps(cmu_walk):
+    """Dropped frames, in whose place the last one is shown again; where the body rests that is nothing."""
+    clip = cmu_walk.slice(1, 209)
+    runs = [(30, 31), (61, 63), (90, 91), (150, 152)]
+    found = scan(doubled(clip, *runs))
+    assert [(one.kind, one.start, one.stop) for one in found] == [("doubled", *run) for run in runs]
+    assert to_gaps(found) == [Gap(*run) for run in runs]
+    assert not scan(clip)
+    at = np.minimum(np.arange(200), 100)  # it walks, and rests
+    still = doubled(clip.with_motion(clip.rotation[at], clip.translation[at]), (150, 152))
+    assert "doubled" not in {one.kind for one in scan(still)}
 
 
 def test_frames_that_tremble_are_said(cmu_walk):

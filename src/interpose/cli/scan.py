@@ -57,7 +57,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         return
     say()
     dropped = [one for one in found if one.kind == "lost"]
-    shown = [one for one in found if one not in dropped[SHOWN:]]
+    doubled = [one for one in found if one.kind == "doubled"]
+    shown = [one for one in found if one not in dropped[SHOWN:] + doubled[SHOWN:]]
     say_table(
         ("kind", "frames", "length", "joints", "note"),
         [
@@ -67,7 +68,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         right=("frames", "length"),
     )
     if len(found) > len(shown):
-        say(f"and {len(found) - len(shown)} more that are lost; --json lists them all")
+        say(f"and {len(found) - len(shown)} more that are lost or doubled; --json lists them all")
     say()
     if to_gaps(found):
         say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")

@@ -46,6 +46,8 @@ EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
+# Metres a second, in the mean over joints, at which a body moves before and after a frame that is doubled.
+MOVES = 0.2
 # Kinds of findings that are no gaps.
 NO_GAPS = (
     *(
@@ -72,7 +74,7 @@ class Finding:
 
     Attributes:
         kind: "missing", "frozen", "still", "frozen position", "frozen body", "straight", "splined",
-            "rest pose", "outlier", "lost", "exchanged", "flipped", "jump", "repeated" or "noisy".
+            "rest pose", "outlier", "lost", "exchanged", "flipped", "jump", "doubled", "repeated" or "noisy".
         joints: the joints concerned, or None for the whole pose.
         start, stop: frames start to stop - 1 are those to replace. Of a run of equal frames that is all but
             the one that was held.
@@ -122,8 +124,9 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       ends for a while, so that the knee bends backwards: `recover` turns them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
       there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
-    - "repeated": whole frames that are the one before, again and again while the body moves: fewer frames a
-      second than the file says.
+    - "doubled": whole frames that are the one before while the body moves at .2 m/s or more on both sides,
+      fewer than are frozen: frames that were dropped, and the last one shown once more.
+    - "repeated": the same again and again: fewer frames a second than the file says.
     - "noisy": frames in which the body trembles by more than recorded motion does: what `denoise` smooths.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
@@ -169,6 +172,8 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
             or one.start > again.stop + 1
         ]
     # What repeats spans all else, and says nothing of it.
+    if not repeated:
+        findings += _doubled(clip, turned, moved, first)
     findings += repeated + _lost(clip, findings)
     if not repeated:
         findings += _jumps(clip, known, findings)
@@ -290,7 +295,7 @@ class _Steps:
     @property
     def shortest(self) -> int:
         """How many steps a frozen run has, at least."""
-        return max(3, round(SHORTEST * self.clip.fps))
+        return _shortest(self.clip.fps)
 
     def finding(self, kind: str, joints: tuple[str, ...] | None, run: Run, why: str = "") -> Finding:
         """What a run says."""
@@ -304,6 +309,10 @@ class _Steps:
             why = f", {'to the end, ' * to_end}and comes to rest {'' if to_end else 'and sets off '}by itself"
         note = f"{what} for {(run.stop - run.start) / self.clip.fps:.2f} s{why}"
         return Finding(kind, joints, self.first + begin, self.first + end, note)
+
+
+def _shortest(fps: float) -> int:
+    return max(3, round(SHORTEST * fps))
 
 
 def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> list[Finding]:
@@ -446,12 +455,13 @@ def _but_whole(findings: list[Finding], stiff: list[Finding]) -> list[Finding]:
 def _pace_beside(clip: Clip, start: int, stop: int) -> float:
     """Metres a second, in the mean over all joints: how fast a body is right before frame `start`, or after
     `stop`, whichever is more."""
-    paces = [
-        float(np.linalg.norm(np.diff(clip.slice(a, a + 2).positions(), axis=0), axis=-1).mean() * clip.fps)
-        for a in (start - 1, stop)
-        if 0 <= a < len(clip) - 1
-    ]
-    return max(paces, default=0.0)
+    return max((_pace(clip, a) for a in (start - 1, stop) if 0 <= a < len(clip) - 1), default=0.0)
+
+
+def _pace(clip: Clip, frame: int) -> float:
+    """Metres a second, in the mean over all joints, from a frame to the next."""
+    step = np.diff(clip.slice(frame, frame + 2).positions(), axis=0)
+    return float(np.linalg.norm(step, axis=-1).mean() * clip.fps)
 
 
 def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
@@ -540,6 +550,19 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
     return found
 
 
+def _doubled(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> list[Finding]:
+    """Single frames, or a few, that are the one before though the body moves; steps as in `_frozen`."""
+    found, still = [], _still(turned, moved)
+    for start, stop in runs(still):
+        before, after = first + start, first + stop  # the frame that is shown again, and the last that is it
+        if stop - start >= _shortest(clip.fps) or start == 0 or stop == len(still):
+            continue
+        if min(_pace(clip, before - 1), _pace(clip, after)) >= MOVES:
+            note = "the frame before once more, while the body moves"
+            found.append(Finding("doubled", None, before + 1, after + 1, note))
+    return found
+
+
 def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> list[Finding]:
     """Frames that are the one before though the body moves: one finding; steps as in `_frozen`."""
     brief = _holds(turned, moved, fps)
@@ -553,8 +576,7 @@ def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> 
 
 def _holds(turned: np.ndarray, moved: np.ndarray, fps: float) -> list[tuple[int, int]]:
     """Runs of steps in which nothing moves, again and again; none where that is the exception."""
-    with np.errstate(invalid="ignore"):
-        same = np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
+    same = _still(turned, moved)
     for longest, often in ((REPEATS, OFTEN), (round(HOLDS * fps), MOSTLY)):
         brief = [run for run in runs(same) if run[1] - run[0] <= longest]
         inside = [run for run in brief if run[0] > 0 and run[1] < len(same)]
@@ -562,6 +584,12 @@ def _holds(turned: np.ndarray, moved: np.ndarray, fps: float) -> list[tuple[int,
         if len(inside) >= MANY and again >= often * (inside[-1][1] - inside[0][0]):
             return brief
     return []
+
+
+def _still(turned: np.ndarray, moved: np.ndarray) -> np.ndarray:
+    """(F - 1,) the steps in which nothing moves; unknown values do."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
 
 
 def _noisy(clip: Clip, known: Observation) -> list[Finding]:
@@ -597,5 +625,5 @@ def _suspicious(run: Run, fps: float, pace: float) -> bool:
     """Whether a run of one joint is more than a pause; `pace` is 1 / frames in which it usually moves far."""
     length = run.stop - run.start
     if run.jumps_in or run.jumps_out:
-        return length >= max(3, round(SHORTEST * fps))
+        return length >= _shortest(fps)
     return length >= round(SHORTEST_WITHOUT_JUMP * fps) and length * pace >= 1
