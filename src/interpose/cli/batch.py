@@ -167,7 +167,7 @@ class Batch:
         """The list of --json, and the line that sums up, on stderr."""
         if self.as_json:
             say_json(self.entries)
-        parts = [f"{self.codes.count(0)} of {len(self.files)} files done"]
+        parts = [f"{self.codes.count(0) - self.skipped} of {len(self.files)} files done"]
         parts += [f"{self.skipped} skipped, as their results were there"] if self.skipped else []
         idle = sum(isinstance(entry, dict) and "nothing" in entry for entry in self.entries)
         parts += [f"{idle} with nothing to do"] if idle else []
