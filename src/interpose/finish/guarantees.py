@@ -26,7 +26,7 @@ from interpose.skeletons.carrier import rooted
 
 STOOD = "what the body stands on tells where it is"
 # Rounds in which velocity jumps above the limit are softened.
-ROUNDS = 12
+ROUNDS = 24
 # A simpler method takes over where it pops by less than this share of what the method does: the hand of a
 # body that falls jumps with either.
 LESS = 0.9
