@@ -476,6 +476,14 @@ def test_auto_takes_networks_at_any_length_where_keys_are_lone(cmu_walk):
     assert [gap.method for gap in tasks.between(cmu_walk, [0, 40, 90]).report.gaps] == ["base", "base"]
 
 
+@pytest.mark.parametrize("method", ["small", "base"])
+def test_who_walks_walks_on_for_seconds(cmu_walk, method):
+    """As far as in truth to a quarter; half of it where what is said of the first seconds counts as known."""
+    done = tasks.fill(cmu_walk, [Gap(100, 209)], method).clip
+    ways = [np.linalg.norm(np.diff(one.root[99:], axis=0), axis=1).sum() for one in (done, cmu_walk)]
+    assert 0.75 < ways[0] / ways[1] < 1.25
+
+
 def test_half_a_turn_between_lone_keys_takes_the_time_there_is(cmu_walk):
     """Seen from either way round it is as far; a network alone would snap."""
     pose, body = cmu_walk.slice(0, 1), find_humanoid(cmu_walk)
@@ -485,7 +493,7 @@ def test_half_a_turn_between_lone_keys_takes_the_time_there_is(cmu_walk):
         done = tasks.between(tasks.block({0: pose, 46: there}), [0, 46])
         assert done.report.gaps[0].method == "base"
         faces = np.unwrap(facing(body.positions(done.clip)))
-        assert np.degrees(np.abs(np.diff(faces))).max() * cmu_walk.fps < 330
+        assert np.degrees(np.abs(np.diff(faces))).max() * cmu_walk.fps < 360
 
 
 def dropped(clip, share):  # type: ignore[no-untyped-def]
