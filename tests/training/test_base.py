@@ -266,7 +266,7 @@ def trained(walk_pack, tmp_path_factory):  # type: ignore[no-untyped-def]
 
 def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path, weights_alone):
     card, pack = trained[0], walk_pack("lafan1", both=True)
-    settings = BaseSettings(width=24, layers=1, batch=4, longest=40, learning_rate=0.1)
+    settings = BaseSettings(width=24, layers=1, batch=4, longest=20, learning_rate=0.1)
     model = train_base([pack], tmp_path, Budget.parse("3steps"), settings, start=card, say=lambda line: None)
     made = export_base(tmp_path, [pack], tmp_path / "weights", ["train"], mean=card)
     before, after = Base(model.config), Base(model.config)
@@ -279,6 +279,7 @@ def test_the_mean_with_what_a_run_started_from(trained, walk_pack, tmp_path, wei
         assert torch.allclose(value, (ends[0] + ends[1]) / 2, atol=2e-3)
     assert apart > 0.02, "it has learned something"
     assert made.training["mean_with"].startswith("small of commit")
+    assert made.max_gap == card.max_gap == 40, "of longer gaps it knows from before"
     log = json.loads((tmp_path / "weights" / "log.jsonl").read_text().splitlines()[-1])
     assert made.metrics["validation"]["gap5"] != log["gap5"], "measured anew"
 

@@ -319,6 +319,9 @@ def export_base(
     export_base_onnx(model, path)
     _curves(log, name, "weighted loss", (5, 15, 30, 45), out)
     del network["labels"]
+    training = run.training("base", model)
+    # What it learned before, of longer gaps, it still knows.
+    longest = max(one.get("longest", 0) for one in (settings, *training.get("earlier", ())))
     card = Card(
         name=name,
         method=name if name in METHODS else "small",  # which runs networks of that kind, of any size
@@ -327,8 +330,8 @@ def export_base(
         tasks=["fill", "between", "recover", "forecast"],
         joints=list(JOINTS),
         fps=30.0,
-        max_gap=min(settings["longest"], model.config.longest - 2 * settings["context"]),
-        training={**run.training("base", model), "network": network},
+        max_gap=min(longest, model.config.longest - 2 * settings["context"]),
+        training={**training, "network": network},
         metrics={"validation": measured},
         auto=run.auto,
         labels=labels,
