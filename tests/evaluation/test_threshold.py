@@ -30,12 +30,12 @@ def test_better_from_there_on_at_every_length(network, expected):
 
 
 def test_a_method_is_measured_beside_the_spline(published):
-    found = threshold.measure(published, "zero-velocity", most=2)
+    found = threshold.measure(published, "kalman", most=2)
     assert found.count == 2
-    assert list(found.errors) == ["linear", "spline", "zero-velocity"]
+    assert list(found.errors) == ["linear", "spline", "kalman"]
     assert all(errors[0] < errors[-1] for errors in found.errors.values()), "longer gaps are harder"
     assert found.from_gap == 31
-    assert "zero-velocity is better than the spline from 31 frames on" in str(found)
+    assert "kalman is better than the spline from 31 frames on" in str(found)
 
 
 def test_on_the_command_line(published, tmp_path, capsys):
