@@ -698,3 +698,13 @@ def test_who_is_elsewhere_at_the_next_key_walks_there(cmu_walk):
     placed = tasks.between(keys, [0, 60], method="small").clip.positions()
     glides = measures.glides(placed[:, feet.pairs(keys.skeleton)], placed[:, 0], keys.fps)
     assert glides.mean() < 0.5
+
+
+def test_of_a_gap_in_pieces_the_joint_nearest_to_its_limit_counts():
+    pieces = [
+        GapReport(10, 40, None, "small", seam_after=2.0, seam_limit=5.0, number=1),
+        GapReport(40, 60, None, "small", seam_after=1.5, seam_limit=1.6, number=1),
+        GapReport(60, 80, None, "small", number=1),
+    ]
+    (whole,) = windows.joined(pieces)
+    assert (whole.start, whole.stop, whole.seam_after, whole.seam_limit) == (10, 80, 1.5, 1.6)

@@ -108,7 +108,8 @@ def compare(
         [_row(one, name, auto.get(one.number) == name, clip.fps) for one, name in rows],
         right=("gap", "frames", "length", "seam", "inside", "slide", "travel", "moves", "off"),
     )
-    say("seam, inside: largest velocity jump at the ends, and between them, cm/frame^2", style="dim")
+    say("seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit", style="dim")
+    say("inside: largest velocity jump between the ends, cm/frame^2", style="dim")
     say("slide, travel: of the feet, cm/s and m; moves: as a share of the motion around", style="dim")
     say(
         "off: cm that joints are expected to be off by, where the method says so; *: what auto takes",

@@ -132,10 +132,13 @@ def joined(reports: list[GapReport]) -> list[GapReport]:
         worst = {
             name: _over(last, one, name, max)
             for name in (
-                *("seam_before", "seam_after", "peak", "peak_limit", "bone_deviation"),
+                *("seam_before", "peak", "peak_limit", "bone_deviation"),
                 *("penetration", "path", "pins", "drift"),
             )
         }
+        # A joint's velocity jump goes with its own limit.
+        seam = max(last, one, key=lambda part: (part.seam_after or 0.0) / (part.seam_limit or 1.0))
+        worst |= {"seam_after": seam.seam_after, "seam_limit": seam.seam_limit}
         means = {
             name: _over(last, one, name, lambda a, b, share=share: a + share * (b - a))
             for name in (
