@@ -9,6 +9,9 @@ import pytest
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
+from interpose.finish import complete
+from interpose.methods.classical import Linear
+from interpose.observation import Gap, Observation
 
 BONES = np.array([[0, 1, 0], [0, 0.5, 0], [0.3, 0, 0], [2, 0, 0]])
 
@@ -144,3 +147,15 @@ def test_roots_cannot_be_left_out_of_what_is_translated():
     whole = clip()
     with pytest.raises(RequestError, match="is not translated"):
         replace(whole, translation=whole.translation[:, :1], translated=(0,))
+
+
+def test_what_a_prompt_shows_of_a_clip_is_a_line():
+    """And not its numbers: there may be millions of them."""
+    take = clip(60, name="take")
+    seen = Observation.from_gaps(take, [Gap(10, 20)])
+    assert repr(take) == "<Clip 'take': 60 frames at 30 fps (2.0 s), 4 joints>"
+    assert repr(take.skeleton) == "<Skeleton: 4 joints below hips, prop>"
+    assert repr(seen) == "<Observation: 4 joints, all known in 50 of 60 frames>"
+    done = complete(take, seen, Linear())
+    assert repr(done) == f"<Completion of {take!r}>\n{done.report}"
+    assert repr(done.report) == f"<Report of linear>\n{done.report}"

@@ -86,6 +86,10 @@ class Skeleton:
     def __len__(self) -> int:
         return len(self.names)
 
+    def __repr__(self) -> str:
+        tops = ", ".join(self.names[root] for root in self.roots)
+        return f"<Skeleton: {len(self)} joints below {tops}>"
+
     def index(self, name: str) -> int:
         """The index of a joint; raises RequestError listing all joints when there is none."""
         try:
@@ -210,6 +214,11 @@ class Clip:
 
     def __len__(self) -> int:
         return self.rotation.shape[0]
+
+    def __repr__(self) -> str:
+        name = f" {self.name!r}" if self.name else ""
+        length = f"{len(self)} frames at {self.fps:g} fps ({self.seconds:.1f} s)"
+        return f"<Clip{name}: {length}, {len(self.skeleton)} joints>"
 
     @property
     def seconds(self) -> float:

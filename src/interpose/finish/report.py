@@ -231,6 +231,9 @@ class Report:
         rest = f"; left, without a like on the other side: {few(self.unpaired)}" * bool(self.unpaired)
         return f"taken for the other side, or for half a turn, and put back: {what}{rest}"
 
+    def __repr__(self) -> str:
+        return f"<Report of {self.method}>\n{self}"
+
     def __str__(self) -> str:
         if self.noise is not None:
             return "\n".join(line for line in (self.sides, str(self.noise)) if line)
@@ -254,6 +257,9 @@ class Completion:
     said: Callable[[], Raw] = field(repr=False)
     provenance: np.ndarray = field(repr=False)
     report: Report
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.clip!r}>\n{self.report}"
 
     @cached_property
     def raw(self) -> Raw:

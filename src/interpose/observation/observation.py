@@ -171,6 +171,12 @@ class Observation:
                 "Both are (frames, joints), True where a value is known.",
             )
 
+    def __repr__(self) -> str:
+        frames, joints = self.rotation.shape
+        whole = int((self.rotation & self.translation).all(axis=1).sum())
+        pins = f", {len(self.pins)} pins" if self.pins else ""
+        return f"<Observation: {joints} joints, all known in {whole} of {frames} frames{pins}>"
+
     def check(self, clip: Clip) -> None:
         """RequestError if it has other frames or joints than a clip."""
         if self.rotation.shape != clip.rotation.shape[:2]:

@@ -21,7 +21,7 @@ AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
 HOTTEST = 10.0  # times the noise of the training that may be injected
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Forecast(Completion):
     """A clip and what follows, and other ways in which it may go on.
 

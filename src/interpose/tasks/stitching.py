@@ -38,7 +38,7 @@ class Loop:
     limit: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Stitched(Completion):
     """A completion that tells where each clip lies on the timeline, and of a loop how it closes."""
 
