@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 from scipy.ndimage import gaussian_filter1d
 
 from interpose.clip import Clip
@@ -65,7 +65,7 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
     frames = np.arange(start - 1, stop + 1)
     knots, places = [start - 1, *sorted(points), stop], over_floor(clip)
     off = [np.zeros(2), *(points[k] - places[k] for k in sorted(points)), np.zeros(2)]
-    shift = CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
+    shift = scipy.interpolate.CubicSpline(knots, np.array(off), bc_type="clamped")(frames)
     old = places[frames]
     near = np.minimum(frames - frames[0], frames[-1] - frames) / clip.fps
     turn = rotations.about("Y", _turns(old, old + shift, near, clip.fps))

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain, repeat
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError, is_number
@@ -340,7 +340,7 @@ def _between(frames: int, at: np.ndarray, values: np.ndarray, edges: list[int], 
     points = points[first]
     if len(knots) == 1:
         return np.repeat(points, frames, axis=0)
-    way = PchipInterpolator(knots, points)
+    way = scipy.interpolate.PchipInterpolator(knots, points)
     done = np.asarray(way(np.clip(np.arange(frames), knots[0], knots[-1])))
     apart = np.diff(knots)
     for k in range(1, len(knots) - 1):

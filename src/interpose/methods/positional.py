@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy import interpolate, ndimage
+import scipy
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
@@ -133,7 +134,7 @@ def weave(said: np.ndarray, times: np.ndarray, positions: np.ndarray, known: np.
         if len(at) == 1:
             done[:, joints] = values
             continue
-        curve = interpolate.CubicSpline(at[order], values)
+        curve = scipy.interpolate.CubicSpline(at[order], values)
         done[:, joints] = curve(np.clip(frames, at.min(), at.max()))
     return done
 

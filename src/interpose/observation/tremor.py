@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import ndimage
-from scipy.stats import chi
+from scipy.special import gammaincinv
 
 from interpose.clip import Clip
 from interpose.geometry.time import runs
@@ -12,6 +12,8 @@ from interpose.geometry.time import runs
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 GAIN = float(np.linalg.norm(DIFFERENCE))
+# The median length of three coordinates of white noise of deviation 1: of a chi distribution.
+LENGTH = float(np.sqrt(2 * gammaincinv(3 / 2, 0.5)))
 FEWEST = 8  # frames: less motion cannot be told from noise
 # Frames a second: with fewer, what is quick jumps from one to the next as noise does. Clean clips at 24 are
 # moved by .4 cm at most, some at 20 by 24 cm.
@@ -33,7 +35,7 @@ def deviation(values: np.ndarray) -> np.ndarray:
 def trembling(values: np.ndarray) -> np.ndarray:
     """(F - 4, n) by what signals (F, n, d) tremble: its median is the standard deviation of white noise."""
     fourth = sum(w * values[i : len(values) - 4 + i] for i, w in enumerate(DIFFERENCE))
-    return np.asarray(np.linalg.norm(fourth, axis=-1) / GAIN / chi.median(3))
+    return np.asarray(np.linalg.norm(fourth, axis=-1) / GAIN / LENGTH)
 
 
 def bursts(clip: Clip) -> list[tuple[int, int]]:
