@@ -277,7 +277,10 @@ class Seen:
 
     def __str__(self) -> str:
         feet = f"feet {self.slide:.1f} cm/s {self.travel:.2f} m"
-        return f"{feet}; pop {self.pop:.2f}; bones {self.bones:.2f} cm"
+        pop = (
+            f"; pop {self.pop:.2f}" if math.isfinite(self.pop) else ""
+        )  # a clip that ends with its keys has none
+        return f"{feet}{pop}; bones {self.bones:.2f} cm"
 
 
 @dataclass

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import anatomy, feet, floor, jumps, notes, pins, seams
+from interpose.finish import anatomy, feet, floor, jumps, notes, pins, seams, stepping
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
 from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
@@ -25,6 +25,7 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import rooted
 
 STOOD = "what the body stands on tells where it is"
+STEPS = "the body turns on the spot, in steps"
 # Rounds in which velocity jumps above the limit are softened.
 ROUNDS = 24
 # A simpler method takes over where it pops by less than this share of what the method does: the hand of a
@@ -79,6 +80,7 @@ class _Work:
         before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
         mended: the frames of spans over which a spline leads, by the span's first.
+        stepped: the first frames of spans that were given steps, and whether in the method's own motion.
     """
 
     def __init__(self, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> None:
@@ -89,6 +91,7 @@ class _Work:
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
         self.unheld: dict[Gap, tuple[float, float]] = {}
         self.mended: dict[int, list[tuple[int, int]]] = {}
+        self.stepped: set[tuple[int, bool]] = set()
 
     def listen(self) -> None:
         """Let the method speak, and start from what it says."""
@@ -145,7 +148,9 @@ class _Work:
                 self.mended[span.start] = places
         for span in chosen:
             self.unheld.update(slides(current, self.known, span, self.gaps))
-            if not (own and layer and layer.stands):
+            if not layer and _step(current, self.firm, span):
+                self.stepped.add((span.start, own))
+            elif not (own and layer and layer.stands):
                 _plant(current, self.firm, span, self.bounds, self.raw.stands if own else None)
                 _lift(current, self.firm, span)
         if self.bounds is None:
@@ -198,6 +203,8 @@ class _Work:
             for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():
                 which = f"frames {ask.first + start} to {ask.first + stop - 1}"
                 span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
+            if (span.start, span.method == ask.method.name) in self.stepped:
+                span.notes.append((span.start, span.stop - 1, STEPS))
             excess, above, where = jumps.excess(current, known, span, self.bounds, ask.first)
             if excess > 1:
                 span.notes.append((where, where, f"flagged: {above}"))
@@ -259,6 +266,15 @@ def _lift(current: Clip, known: Observation, span: Span) -> None:
     """Lift what a span has under the floor."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
     write(current, floor.lifted(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
+
+
+def _step(current: Clip, known: Observation, span: Span) -> bool:
+    """Let a body that turns on the spot in a span do it in steps; False where it does not, or does well."""
+    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
+    done = stepping.stepped(current.slice(lo, hi), known.slice(lo, hi), inner)
+    if done is not None:
+        write(current, done, span.start, inner)
+    return done is not None
 
 
 def _plant(

@@ -1,0 +1,118 @@
+"""Who turns on the spot between two keys steps round, and nobody else does."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from interpose import formats
+from interpose.clip import Clip
+from interpose.finish import complete, feet, guarantees, measures
+from interpose.geometry import rotations
+from interpose.methods.classical import Linear
+from interpose.observation import Gap, Observation
+from interpose.skeletons.carrier import hips_of
+
+
+@pytest.fixture(scope="module")
+def standing(data: Path) -> Clip:
+    """Somebody who stands, for one frame."""
+    return formats.load(data / "cmu_jump.bvh").slice(0, 1)
+
+
+def keys(pose: Clip, frames: int, degrees: float, aside: float = 0.0) -> tuple[Clip, Observation]:
+    """A pose, and `frames` later the same pose turned about its hips and moved aside by so many metres."""
+    rotation = np.repeat(pose.rotation, frames + 1, axis=0)
+    translation = np.repeat(pose.translation, frames + 1, axis=0)
+    rotation[-1, 0] = rotations.multiply(rotations.about("Y", np.radians(degrees)), rotation[-1, 0])
+    translation[-1, 0, 0] += aside
+    clip = pose.with_motion(rotation, translation)
+    return clip, Observation.from_gaps(clip, [Gap(1, frames)])
+
+
+def filled(clip: Clip, known: Observation) -> tuple[Clip, bool]:
+    done = complete(clip, known, Linear())
+    [gap] = done.report.gaps
+    return done.clip, guarantees.STEPS in gap.notes
+
+
+@pytest.mark.parametrize(
+    ("frames", "degrees", "aside"), [(30, 60, 0), (30, -90, 0.1), (45, 135, 0), (60, 175, 0), (30, 0, 0.4)]
+)
+def test_one_foot_stands_while_the_other_one_steps(standing, frames, degrees, aside):
+    clip, known = keys(standing, frames, degrees, aside)
+    done, steps = filled(clip, known)
+    assert steps
+    placed, pairs = done.positions(), feet.pairs(done.skeleton)
+    slowest = measures.speed(placed[:, pairs], done.fps).max(axis=2).min(axis=1)
+    assert slowest.max() < 0.15
+    slide, _ = feet.measure(done, known, 1, frames)
+    assert slide < 6
+    assert feet.drifts(done, known, [(1, frames)])[0][0] < 0.05
+    # They come off the floor, and not through it.
+    heights = placed[:, pairs, 1] - placed[0, pairs, 1]
+    assert heights.max(axis=(0, 2)).min() > 0.04
+    assert heights.min() > -0.02
+    assert (done.rotation[[0, -1]] == clip.rotation[[0, -1]]).all()
+
+
+def test_a_large_turn_is_an_even_one(standing):
+    """Networks whirl half round in a few frames."""
+    clip, known = keys(standing, 60, 175)
+    done, _ = filled(clip, known)
+    legs = feet.legs(done.skeleton)
+    placed = done.positions()
+    across = placed[:, legs[0].thigh] - placed[:, legs[1].thigh]
+    heading = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+    assert heading[-1] - heading[0] == pytest.approx(175, abs=0.5)
+    assert np.abs(np.diff(heading)).max() * 30 < 1.6 * 175 / 2
+
+
+def test_turned_and_moved_keys_give_the_same_steps(standing):
+    clip, known = keys(standing, 30, 90)
+    reference = filled(clip, known)[0].positions()
+    turn, shift = rotations.about("Y", np.radians(70.0)), np.array([3.0, 0.0, -2.0])
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    translation = rotations.rotate(turn, translation) + shift
+    done, steps = filled(clip.with_motion(rotation, translation), known)
+    assert steps
+    assert np.allclose(done.positions(), rotations.rotate(turn, reference) + shift, atol=1e-6)
+
+
+def test_hips_sink_for_straight_legs_alone(standing):
+    """And by little: a step aside takes a longer leg than there is."""
+    clip, known = keys(standing, 30, 0, 0.4)
+    hips = filled(clip, known)[0].positions()[:, hips_of(standing.skeleton), 1]
+    assert 0 <= hips[0] - hips.min() < 0.1
+
+
+def test_without_time_nobody_steps(standing):
+    assert not filled(*keys(standing, 8, 90))[1]
+
+
+def test_a_pose_that_comes_back_stays(standing):
+    done, steps = filled(*keys(standing, 30, 5))
+    assert not steps
+    assert feet.measure(done, keys(standing, 30, 5)[1], 1, 30)[1] < 0.1
+
+
+def test_who_walks_or_lies_does_not_turn_on_the_spot(standing, cmu_walk):
+    walk = cmu_walk.slice(30, 61)
+    assert not filled(walk, Observation.from_gaps(walk, [Gap(1, 30)]))[1]
+    clip, known = keys(standing, 30, 90)
+    lying = clip.rotation.copy()
+    lying[:, 0] = rotations.multiply(rotations.about("X", np.radians(90.0)), lying[:, 0])
+    assert not filled(clip.with_motion(lying, clip.translation), known)[1]
+
+
+def test_what_is_known_of_a_leg_stays(standing):
+    clip, known = keys(standing, 30, 90)
+    shin = standing.skeleton.names.index("LeftLeg")
+    rotation = known.rotation.copy()
+    rotation[:, shin] = True
+    done, steps = filled(clip, Observation(rotation, known.translation))
+    assert not steps
+    assert (done.rotation[:, shin] == clip.rotation[:, shin]).all()
