@@ -182,13 +182,13 @@ def _steps(turn: Turn, clip: Clip, span: tuple[int, int]) -> np.ndarray | None:
         first = int(own[1] < own[0])
         middles[0] = np.clip(own.min(), takes / 2, frames - 1.5 * takes)
         middles[1] = np.clip(own.max(), middles[0] + takes, frames - takes / 2)
-    time = np.arange(1, frames)
+    time, toes = np.arange(1, frames), [leg.toe is not None for leg in feet.legs(clip.skeleton)]
     path = np.empty((frames - 1, 2, 2, 3))
     for leg in range(2):
         phases = (time[:, None] - middles[leg != first :: 2]) / takes + 0.5
         path[:, leg] = turn.stance(leg, ramp(phases).mean(axis=1))
         lift = np.sin(np.pi * np.clip(phases, 0, 1)).sum(axis=1) ** 2
-        path[:, leg, :, 1] += lift[:, None] * LIFT * grown
+        path[:, leg, :, 1] += lift[:, None] * (LIFT if toes[leg] else LIFT[0]) * grown
     return path
 
 
