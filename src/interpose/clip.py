@@ -246,7 +246,10 @@ class Clip:
         return self.kinematics()[1]
 
     def slice(self, start: int, stop: int) -> Clip:
-        """Frames start to stop - 1, as a clip of its own without the file's layout."""
+        """Frames start to stop - 1, as a clip of its own without the file's layout.
+
+        Numbers count as in any slice: what is not there is left out, negative ones count from the end.
+        """
         return replace(
             self, rotation=self.rotation[start:stop], translation=self.translation[start:stop], source=None
         )

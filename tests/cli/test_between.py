@@ -217,6 +217,19 @@ def test_a_target_that_lies_still_on_another_body_is_met_at_rest(run, take):
         (["--start", "take.bvh#999", "--target", "take.bvh", "--frames", "5"], "no frame 999"),
         (["--start", "take.bvh", "--target", "take.bvh", "--frames", "5", "--anchor", "take.bvh@6"], "@6"),
         (["--start", "take.bvh", "--target", "none.bvh", "--frames", "5"], "none.bvh"),
+        (
+            [
+                "--start",
+                "take.bvh#0",
+                "--target",
+                "take.bvh",
+                "--anchor",
+                "take.bvh#9@5",
+                "--anchor",
+                "take.bvh#7@5",
+            ],
+            "cannot meet take.bvh#7 at frame 5",
+        ),
     ],
 )
 def test_what_makes_no_sense_is_refused_in_three_lines(run, take, options, said):

@@ -183,3 +183,16 @@ def test_joints_are_known_without_their_namespace(run, rigs):
     lost = run("recover", "hands.bvh", "--joints", "RightForeArm", "--frames", "40:60", "--json")
     assert lost.json["gaps"][0]["joints"] == ["mixamorig:RightForeArm"]
     assert "LeftWing" in run("fill", "hands.bvh", "--gap", "40:60", "--joints", "LeftWing").err
+
+
+def test_a_folder_takes_the_format_of_the_rig(run, rigs, data):
+    """An .amc cannot hold the motion of another skeleton than that of its .asf."""
+    (rigs / "amcs").mkdir()
+    for name in ("cmu_02_03.amc", "cmu_02.asf"):
+        shutil.copy(data / name, rigs / "amcs" / name)
+    reading = ("--skeleton", "amcs/cmu_02.asf")
+    done = run("convert", "amcs", "out", "--onto", "hands.bvh", *reading)
+    assert done.code == 0, done.err
+    [made] = (rigs / "out").iterdir()
+    assert made.name == "cmu_02_03.bvh"
+    assert load(made).skeleton.names == load(rigs / "hands.bvh").skeleton.names

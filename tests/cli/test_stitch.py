@@ -52,11 +52,32 @@ def test_the_report_says_where_a_clip_lies(run, takes):
     assert "step" in placed["gap_before"] or "at" in placed["gap_before"]
     start, stop = map(int, placed["frames"].split(":"))
     turn = np.radians(placed["yaw"])
-    root = load(takes / "walk.bvh").root[100:200]
-    x = np.cos(turn) * root[:, 0] + np.sin(turn) * root[:, 2] + placed["shift"][0]
-    z = np.cos(turn) * root[:, 2] - np.sin(turn) * root[:, 0] + placed["shift"][2]
+    walk = load(takes / "walk.bvh")
+    root, shift = walk.root[100:200], np.array(placed["shift"]) * walk.source.unit
+    x = np.cos(turn) * root[:, 0] + np.sin(turn) * root[:, 2] + shift[0]
+    z = np.cos(turn) * root[:, 2] - np.sin(turn) * root[:, 0] + shift[2]
     made = load(takes / "walk.stitched.bvh").root[start:stop]
     assert np.allclose(made, np.stack([x, root[:, 1], z], axis=1), atol=2e-3)
+
+
+def test_a_shift_is_along_the_axes_of_the_file(run, takes):
+    """The next round of a loop whose file has Z up begins where the numbers of the file, so moved, say."""
+    walk, lying = load(takes / "walk.bvh").slice(0, 80), rotations.about("X", np.radians(90.0))
+    skeleton = replace(
+        walk.skeleton, rest_translation=rotations.rotate(lying, walk.skeleton.rest_translation)
+    )
+    turned = rotations.multiply(rotations.multiply(lying, walk.rotation), rotations.conjugate(lying))
+    translation = rotations.rotate(lying, walk.translation)
+    save(replace(walk, skeleton=skeleton, rotation=turned, translation=translation), takes / "up.bvh")
+    loop = run("stitch", "up.bvh", "--up", "z", "--loop", "--json").json["loop"]
+    rows = (takes / "up.stitched.bvh").read_text().splitlines()
+    at = next(i for i, row in enumerate(rows) if row.startswith("Frame Time")) + 1
+    first, last = (np.array(rows[i].split()[:3], float) for i in (at, -1))
+    turn, (x, y, _) = np.radians(loop["yaw"]), first
+    again = [np.cos(turn) * x - np.sin(turn) * y, np.sin(turn) * x + np.cos(turn) * y, first[2]]
+    again = np.array(again) + loop["shift"]
+    assert loop["shift"][2] == 0
+    assert 0 < np.linalg.norm(again - last) < 8, "one step on, in centimetres"
 
 
 def test_a_loop_of_one_clip(run, takes):

@@ -28,6 +28,8 @@ from interpose.skeletons.humanoid import reflect
 from interpose.skeletons.mirror import mirror
 from interpose.skeletons.rest import find_rest
 
+TOES = ("LeftToe", "RightToe")
+
 HEAPS = ("unreal", "vicon", "makehuman", "rigify")  # rigs whose zero pose is none
 
 
@@ -202,6 +204,19 @@ def test_left_handed_files_are_seen_in_a_mirror(walk, rig):
     assert rotations.angle(back.rotation, written.rotation).max() < 1e-6
 
 
+@pytest.mark.parametrize("rig", ["smpl", "unreal"])
+def test_a_left_handed_rest_pose_is_known_by_its_toes(walk, rig):
+    """What `convert --onto` is given: straight knees bend neither way."""
+    clip, _ = rigs.build(rig, walk)
+    still = np.tile([1.0, 0, 0, 0], (1, 22, 1))
+    pose = find_humanoid(clip).to_clip(still, np.array([[0, 1.0, 0]]), clip.slice(0, 1))
+    written = reflect(pose)
+    assert not find_humanoid(pose).left_handed
+    assert humanoid.inside_out(find_mapping(written.skeleton), written) == "its toes point backwards"
+    reference = find_humanoid(pose).rotations(pose)
+    assert degrees(find_humanoid(written).rotations(written), reference).max() < 1e-3
+
+
 def test_a_left_handed_take_is_filled_as_its_mirror_image(walk):
     clip, _ = rigs.build("smpl", walk)
     one, other = (tasks.fill(c, [Gap(60, 90)], "cae") for c in (clip, reflect(clip)))
@@ -211,7 +226,7 @@ def test_a_left_handed_take_is_filled_as_its_mirror_image(walk):
 
 def test_what_looks_mirrored_either_way_comes_to_an_end(walk, monkeypatch):
     """As rotations in the order x, y, z, w do: knees bend forward in the clip and in its mirror image."""
-    monkeypatch.setattr(humanoid, "knees_bend_forward", lambda *of: True)
+    monkeypatch.setattr(humanoid, "inside_out", lambda *of: "its knees bend forward")
     body = find_humanoid(walk)
     assert body.left_handed
     back = body.to_clip(body.rotations(walk), body.root(walk), walk)
@@ -258,9 +273,13 @@ def test_lost_legs_neither_mirror_nor_sink_the_body(walk):
     assert np.linalg.norm(one.clip.positions() - walk.positions(), axis=-1).mean() < 0.05
 
 
-def test_a_still_says_nothing_of_handedness(walk):
+def test_a_still_without_toes_says_nothing_of_handedness(walk):
     still = walk.with_motion(walk.rotation[:1].copy(), walk.translation[:1])
     still.rotation[:] = [1.0, 0, 0, 0]
+    names = [name.replace("Toe", "Prop") for name in still.skeleton.names]
+    still = replace(
+        still, skeleton=replace(still.skeleton, names=tuple(names), roles=dict.fromkeys(TOES, ""))
+    )
     assert not find_humanoid(still).left_handed
     assert not find_humanoid(reflect(still)).left_handed
     said = replace(still, skeleton=replace(still.skeleton, roles={"hand": "left"}))

@@ -124,6 +124,13 @@ def _blocked(
     from interpose.tasks.blocking import blocked, posed
 
     met_at = [_met(text) for text in anchors]
+    for k, (what, when) in enumerate(met_at):
+        if twice := next((other for other, at in met_at[:k] if at == when), None):
+            raise RequestError(
+                f"cannot meet {what} at frame {when}",
+                f"{twice} is to be met there, too",
+                "Leave one of them out.",
+            )
     named = [_named(text) for text in (start, target, *(what for what, _ in met_at))]
     loaded = reading.load_all([path for path, _ in named])
     clips = [loaded[0], *(on_rig_of(clip, loaded[0]) for clip in loaded[1:])]

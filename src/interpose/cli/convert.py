@@ -49,7 +49,7 @@ def convert(
     Args:
         file: the clip to read, or a folder of clips.
         output: the file to write; of a folder a folder, in which each clip lies as it does in the other.
-        to: of folders: the format that clips are written in; their own without it.
+        to: of folders: the format that clips are written in; that of --onto, or else their own, without it.
         fps: frames a second of what is written.
         onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
             as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
@@ -64,11 +64,12 @@ def convert(
         raise RequestError(
             "--to does not apply to one file", "the suffix of OUT says the format", "Leave it out."
         )
+    ending = to if to is not None or onto is None or alone else onto.suffix[1:].lower()
     each_of = each(_convert, earlier=_earlier)
     return each_of(
         file,
         output=output,
-        to=to,
+        to=ending,
         fps=fps,
         onto=onto,
         drop_repeated=drop_repeated,

@@ -67,12 +67,26 @@ class Reading:
 
     def load_all(self, paths: Sequence[Path]) -> list[Clip]:
         """The clips in several files, of different rigs perhaps: --map and --root are of those in which their
-        joints are, and of one at least."""
-        found = {path: self.load_fitting(path) for path in dict.fromkeys(paths)}
+        joints are, and of one at least; what only some formats need to be told is said of these."""
+        found = {path: self._of(path, paths).load_fitting(path) for path in dict.fromkeys(paths)}
         wrong = [error for _, error in found.values()]
         if all(wrong) and wrong[0]:
             raise wrong[0]
         return [found[path][0] for path in paths]
+
+    def _of(self, path: Path, paths: Sequence[Path]) -> Reading:
+        """What is said of one of several files: not what its format says, if that of another does not."""
+        from interpose.formats import FORMATS
+
+        told = {one: FORMATS[one.suffix.lower()].options for one in paths if one.suffix.lower() in FORMATS}
+        fields = {"unit": "unit", "up": "up", "joint_positions": "joint_positions"}
+        fields |= {"skeleton": "skeleton", "file_fps": "fps"}
+        others = [
+            field
+            for field, option in fields.items()
+            if option not in told.get(path, (option,)) and any(option in one for one in told.values())
+        ]
+        return replace(self, **dict.fromkeys(others))
 
     def load_fitting(self, path: Path) -> tuple[Clip, RequestError | None]:
         """The clip in one of several files, and why --map or --root are not of it, if they are not."""

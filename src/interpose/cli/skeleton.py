@@ -140,13 +140,15 @@ def _places(clip: Clip, frame: int) -> dict[str, list[float]]:
 
 def _print(file: Path, clip: Clip, body: Humanoid, frame: int | None) -> None:
     from interpose.skeletons import JOINTS
+    from interpose.skeletons.humanoid import inside_out
 
     mapping = body.mapping
     say("\n".join(describe(file, clip)))
     if mapping.usable:
         say(f"  {_t_pose(body)}; leg {mapping.leg_length:.2f} m")
         if body.left_handed:
-            say("  left-handed: its knees bend forward, so networks see it in a mirror")
+            why = inside_out(mapping, clip) or "as it is said"
+            say(f"  left-handed: {why}, so networks see it in a mirror")
     else:
         say("  Networks cannot fill it, classical methods can. --save-map writes a map to complete.")
     of = {joint: (name, how) for name, joint, how in zip(JOINTS, mapping.joints, mapping.how)}

@@ -14,6 +14,7 @@ from interpose.cli.console import names, progress, say, say_json, say_table, sec
 from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
 from interpose.errors import RequestError
+from interpose.formats.place import vectors_in_file
 from interpose.observation import Gap
 from interpose.skeletons.carrier import hips_of
 
@@ -25,7 +26,13 @@ if TYPE_CHECKING:
 
 TRAVELS = 0.5  # metres over the floor: a body that travels, whose root may go along
 # Of what only this verb measures.
-UNITS = {"yaw": "degrees", "shift": "m", "way": "m", "jump": "cm/frame^2", "limit": "cm/frame^2"}
+UNITS = {
+    "yaw": "degrees",
+    "shift": "the file's unit and axes",
+    "way": "m",
+    "jump": "cm/frame^2",
+    "limit": "cm/frame^2",
+}
 
 
 @dataclass(frozen=True)
@@ -230,8 +237,10 @@ def _lengths(text: str) -> str | list[int] | int:
     return int(text) if len(said) == 1 else [int(one) for one in said]
 
 
-def _placed(placement: Placement) -> dict[str, Any]:
-    shift = [round(value, 4) for value in placement.shift]
+def _placed(placement: Placement, clip: Clip) -> dict[str, Any]:
+    """A placement as numbers of the file that a clip is written to: what --path and --pin speak in, too."""
+    unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
+    shift = [round(float(value), 4) for value in vectors_in_file(np.array(placement.shift), unit, up)]
     return {"yaw": round(float(np.degrees(placement.yaw)), 2), "shift": shift}
 
 
@@ -242,7 +251,7 @@ def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:
             "file": str(piece.file),
             "part": piece.part,
             "frames": f"{laid.start}:{laid.stop}",
-            **_placed(laid.placement),
+            **_placed(laid.placement, done.clip),
             "scale": round(laid.scale, 4),
             **({"retargeted": True} if piece.retargeted else {}),
             "gap_before": laid.why,
@@ -258,7 +267,7 @@ def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:
         "jump": loop.jump,
         "limit": loop.limit,
     }
-    return {"clips": clips, "loop": {**_placed(loop.placement), **closing}}
+    return {"clips": clips, "loop": {**_placed(loop.placement, done.clip), **closing}}
 
 
 def _print_clips(pieces: list[Piece], done: Stitched) -> None:

@@ -17,7 +17,9 @@ from interpose.skeletons.rest import Rest, find_rest
 LENGTHS = np.linalg.norm(BONES, axis=-1)  # of the canonical body
 THIGHS = [JOINTS.index("LeftUpLeg"), JOINTS.index("RightUpLeg")]
 SHORT = 0.01  # metres: what a shorter bone points at means nothing
+SIDED = ("Left", "Right")
 CLEAR = 0.04  # the sine of a bend of both knees together, in the mean: less tells nothing
+AHEAD = 0.5  # how far toes point ahead, of two, in the mean: less tells nothing
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,8 @@ class Humanoid:
     joint's own global rotation times a constant, so the way there and back is exact.
 
     Some programs write left-handed axes: read as right-handed ones, the body is its own mirror image, whose
-    knees bend forward. Such a clip is reflected on the way to canonical numbers, and back.
+    knees bend forward, or whose toes point backwards. Such a clip is reflected on the way to canonical
+    numbers, and back.
 
     Attributes:
         clip: the clip; its motion is looked at for what the skeleton itself does not tell.
@@ -52,9 +55,9 @@ class Humanoid:
 
     @cached_property
     def left_handed(self) -> bool:
-        """Whether the clip is its own mirror image: somebody says so, or its knees bend forward."""
+        """Whether the clip is its own mirror image: somebody says so, or its body shows it."""
         said = self.mapping.skeleton.roles.get("hand")
-        return said == "left" if said else knees_bend_forward(self.mapping, self.clip)
+        return said == "left" if said else bool(inside_out(self.mapping, self.clip))
 
     @property
     def hand(self) -> np.ndarray:
@@ -258,10 +261,11 @@ def reflect(clip: Clip) -> Clip:
     )
 
 
-def knees_bend_forward(mapping: Mapping, clip: Clip) -> bool:
-    """Whether knees clearly bend the wrong way, as seen from left and right, in the mean over a clip."""
+def inside_out(mapping: Mapping, clip: Clip) -> str:
+    """What shows that a clip is its own mirror image, in the mean over it: "its knees bend forward", as seen
+    from left and right, or, where they are straight, "its toes point backwards"; "" where nothing does."""
     if not mapping.usable or len(clip) == 0:
-        return False
+        return ""
     step = max(1, len(clip) // 100)
     placed = clip.with_motion(clip.rotation[::step], clip.translation[::step]).positions()
     points = np.einsum("cj,fjx->fcx", mapping.weights, placed)
@@ -269,8 +273,17 @@ def knees_bend_forward(mapping: Mapping, clip: Clip) -> bool:
     def way(start: str, end: str) -> np.ndarray:
         return rotations.normalize(points[:, JOINTS.index(end)] - points[:, JOINTS.index(start)])
 
-    bends = [np.cross(way(s + "UpLeg", s + "Leg"), way(s + "Leg", s + "Foot")) for s in ("Left", "Right")]
-    return bool((sum(bends) * way("RightUpLeg", "LeftUpLeg")).sum(-1).mean() < -CLEAR)
+    across = way("RightUpLeg", "LeftUpLeg")
+    bends = [np.cross(way(s + "UpLeg", s + "Leg"), way(s + "Leg", s + "Foot")) for s in SIDED]
+    bend = (sum(bends) * across).sum(-1).mean()
+    if abs(bend) > CLEAR:
+        return "its knees bend forward" if bend < 0 else ""
+    if any(JOINTS.index(side + "Toe") in mapping.levers for side in SIDED):
+        return ""
+    # A T-pose: its legs, upside down, are what points up.
+    ahead = np.cross(across, sum(way(side + "Foot", side + "UpLeg") for side in SIDED))
+    toes = sum((way(side + "Foot", side + "Toe") * rotations.normalize(ahead)).sum(-1) for side in SIDED)
+    return "its toes point backwards" if np.mean(toes) < -AHEAD else ""
 
 
 def canonical_positions(rotation: np.ndarray, root: np.ndarray, bones: np.ndarray) -> np.ndarray:
