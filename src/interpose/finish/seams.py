@@ -18,7 +18,6 @@ from interpose.finish.solve import refine
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
-from interpose.skeletons import SIDES, find_mapping
 
 # Seconds over which a difference in value, and one in velocity, fade into a gap. A slope fades sooner: over a
 # long way it would carry the pose far off.
@@ -57,10 +56,9 @@ def edges(known: Observation, translated: tuple[int, ...], span: tuple[int, int]
 def limits(clip: Clip, observation: Observation) -> np.ndarray | None:
     """(J,) how far the velocity of each joint may jump at seams, in metres per frame squared.
 
-    The 95th percentile of the joint's own velocity jumps, or of its like on the other side, and at least that
-    of all joints pooled: feet that land, and hands, jump three times as far as the rest of a body, which
-    tells nothing of its hips; and in half a second before a gap one foot may have stood while the other one
-    went. None when none are observed, as between lone keys.
+    The 95th percentile of the joint's own velocity jumps, and at least that of all joints pooled: feet that
+    land, and hands, jump three times as far as the rest of a body, which tells nothing of its hips. None when
+    none are observed, as between lone keys.
     """
     own = own_jumps(clip, observation)
     if not own.size:
@@ -70,10 +68,6 @@ def limits(clip: Clip, observation: Observation) -> np.ndarray | None:
     for joint in np.flatnonzero(np.isfinite(own).any(axis=0)):
         told = own[np.isfinite(own[:, joint]), joint]
         most[joint] = max(float(np.percentile(told, PERCENTILE)), pooled)
-    joints = find_mapping(clip.skeleton).joints
-    for one, other in ((joints[row], joints[SIDES[row]]) for row in range(len(joints))):
-        if one is not None and other is not None:
-            most[[one, other]] = max(most[one], most[other])
     return most
 
 
