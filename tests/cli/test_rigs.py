@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import interpose
-from interpose.formats import load
+from interpose.formats import load, save
+from interpose.geometry import rotations
 
 
 @pytest.fixture
@@ -52,6 +54,39 @@ def test_convert_onto_the_same_rig_keeps_every_rotation(run, rigs, data):
     made, ran = load(rigs / "mine.bvh"), load(rigs / "run.bvh")
     assert np.allclose(made.rotation, ran.rotation, atol=1e-6)
     assert np.allclose(made.skeleton.rest_translation, load(rigs / "walk.bvh").skeleton.rest_translation)
+
+
+def test_files_with_six_channels_on_every_joint_go_onto_bodies_and_rigs(run, rigs, data):
+    """As with three, on a body of another size and on one that rests differently."""
+    walk = replace(load(data / "cmu_walk.bvh"), source=None)
+    child = replace(walk.skeleton, rest_translation=0.6 * walk.skeleton.rest_translation)
+    small = replace(walk, skeleton=child, translation=0.6 * walk.translation)
+    made = {"walk": walk, "child": small, "low": _arms_down(walk)}
+    for name, clip in made.items():
+        for channels, joints in ((3, clip.translated), (6, tuple(range(len(clip.skeleton))))):
+            places = clip.local_translation()[:, list(joints)]
+            save(replace(clip, translation=places, translated=joints), rigs / f"{name}{channels}.bvh")
+    for name in ("child", "low"):
+        for channels in (3, 6):
+            words = f"walk{channels}.bvh made{channels}.bvh --onto {name}{channels}.bvh --unit cm --force"
+            assert run("convert", *words.split()).code == 0
+        there = [load(rigs / f"made{channels}.bvh", unit="cm").positions() for channels in (3, 6)]
+        assert np.abs(there[0] - there[1]).max() < 1e-4
+
+
+def _arms_down(clip):
+    """The same motion of a rig that rests with its arms down."""
+    skeleton, rotation = clip.skeleton, clip.rotation.copy()
+    bones = skeleton.rest_translation.copy()
+    for side, turned in (("Left", -1), ("Right", 1)):
+        arm = skeleton.index(side + "Arm")
+        down = rotations.about("Z", np.array(turned * np.pi / 2))
+        for joint in np.flatnonzero(skeleton.below[:, arm]):
+            back = rotations.multiply(rotation[:, joint], rotations.conjugate(down))
+            rotation[:, joint] = back if joint == arm else rotations.multiply(down, back)
+            if joint != arm:
+                bones[joint] = rotations.rotate(down, bones[joint])
+    return replace(clip, skeleton=replace(skeleton, rest_translation=bones), rotation=rotation)
 
 
 def test_between_meets_a_pose_of_another_rig(run, rigs):

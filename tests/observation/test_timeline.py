@@ -66,6 +66,69 @@ def test_bodies_of_other_size_stand_on_the_floor(cmu_walk, run):
     assert abs(before - after) < 0.02
 
 
+def _six_channels(clip: Clip) -> Clip:
+    """The clip with positions of every joint in every frame, as some programs write files."""
+    joints = tuple(range(len(clip.skeleton)))
+    return replace(clip, translation=clip.local_translation(), translated=joints, source=None)
+
+
+def _of_size(clip: Clip, size: float) -> Clip:
+    """A body so many times as large that moves alike."""
+    skeleton = replace(clip.skeleton, rest_translation=size * clip.skeleton.rest_translation)
+    return replace(clip, skeleton=skeleton, translation=size * clip.translation, source=None)
+
+
+@pytest.mark.parametrize("frames", [1, 60])
+def test_joints_with_positions_of_their_own_have_bones_too(cmu_walk, run, frames):
+    """Written with six channels on every joint, a smaller body stays one, and moves as with three."""
+    child = _of_size(cmu_walk, 0.6).slice(0, frames)
+    (plain, wanted), (made, scale) = fit(run, child), fit(_six_channels(run), _six_channels(child))
+    assert scale == wanted < 0.7
+    assert np.array_equal(made.rotation, run.rotation)
+    assert np.allclose(made.positions(), plain.positions(), atol=1e-9)
+    line = lay([_six_channels(run), _six_channels(child)])
+    bones = np.linalg.norm(line.clip.translation[:, 1:], axis=-1)
+    assert np.ptp(bones, axis=0).max() < 1e-9
+
+
+def test_joints_that_give_way_do_so_on_bones_of_another_length(cmu_walk):
+    joint = cmu_walk.skeleton.index("LeftLeg")
+    walk, child = _six_channels(cmu_walk), _six_channels(_of_size(cmu_walk, 0.5))
+    shaken = walk.translation.copy()
+    shaken[::2, joint] *= 1.04
+    made = fit(walk.with_motion(walk.rotation, shaken), child)[0]
+    assert np.allclose(made.translation[:, joint], 0.5 * shaken[:, joint], atol=1e-9)
+
+
+def test_joints_that_are_animated_keep_their_own_places(cmu_walk):
+    """What stretches far, or is nowhere at rest, and all that is of one body."""
+    joint = cmu_walk.skeleton.index("LeftHand")
+    walk, child = _six_channels(cmu_walk), _six_channels(_of_size(cmu_walk, 0.5))
+    moved = walk.translation.copy()
+    moved[:, joint] += np.linspace(0.0, 0.3, len(walk))[:, None]
+    stretched = walk.with_motion(walk.rotation, moved)
+    assert np.array_equal(fit(stretched, child)[0].translation[:, joint], moved[:, joint])
+    assert np.array_equal(fit(stretched, walk)[0].translation, moved)
+    # Nor do they say how the rig rests.
+    bones = walk.skeleton.rest_translation.copy()
+    bones[joint] = [0.0, -0.3, 0.1]
+    other = replace(stretched, skeleton=replace(walk.skeleton, rest_translation=bones))
+    assert np.array_equal(fit(other, stretched)[0].translation, moved)
+
+
+def test_short_bones_with_positions_of_their_own_point_nowhere(cmu_walk):
+    """Where one is a hair long, its direction is chance."""
+    walk = _six_channels(cmu_walk)
+    rigs = []
+    for way in (1e-4, -1e-4):
+        bones, places = walk.skeleton.rest_translation.copy(), walk.translation.copy()
+        bones[7], places[:, 7] = [way, 0.0, 0.0], [way, 0.0, 0.0]
+        rigs.append(
+            replace(walk, skeleton=replace(walk.skeleton, rest_translation=bones), translation=places)
+        )
+    assert np.array_equal(fit(*rigs)[0].translation, rigs[0].translation)
+
+
 def test_the_same_rig_under_another_namespace_is_the_same_rig(cmu_walk):
     def under(space: str, clip):  # type: ignore[no-untyped-def]
         names = tuple(space + name for name in clip.skeleton.names)
@@ -233,7 +296,9 @@ def test_other_skeletons_are_refused(cmu_walk):
     bones = skeleton.rest_translation.copy()
     bones[skeleton.index("LeftForeArm")] = [0.0, -0.3, 0.0]
     with pytest.raises(RequestError, match="LeftForeArm rests 90 degrees away"):
-        lay([cmu_walk, replace(cmu_walk, skeleton=replace(skeleton, rest_translation=bones))])
+        lay([cmu_walk, other := replace(cmu_walk, skeleton=replace(skeleton, rest_translation=bones))])
+    with pytest.raises(RequestError, match="LeftForeArm rests 90 degrees away"):
+        lay([_six_channels(cmu_walk), _six_channels(other)])
     with pytest.raises(RequestError, match="no frames"):
         lay([cmu_walk, cmu_walk.slice(0, 0)])
     moves = tuple(range(len(skeleton)))

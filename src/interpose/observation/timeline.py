@@ -25,7 +25,7 @@ from interpose.observation.part import SAME
 from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import STILL, carriers, hips_of, moved
-from interpose.skeletons.humanoid import Humanoid
+from interpose.skeletons.humanoid import SHORT, Humanoid
 
 MOMENT = 0.5  # seconds at an end of a clip that tell where it is heading, and at which pace
 FURTHEST = 600.0  # seconds: more are a slip of the finger
@@ -36,6 +36,7 @@ PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
 # What is unhurried: turns of a joint (degrees a second), getting up or down (metres a second), and changes of
 # pace (metres a second, a second). A step takes STEP seconds, and a transition that is shorter slides.
 TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
+SWAY = 0.1  # of its length: a bone that the positions of a joint lengthen, or turn, by less is one
 
 
 @dataclass(frozen=True)
@@ -253,8 +254,9 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
     """A clip on the skeleton and at the frame rate of another one, and what its way was multiplied with.
 
     Joints keep their local rotations, so their names (namespaces apart) and rest poses must be the same;
-    bones may be of other lengths. Then places (of the hips, above the floor at height 0 and from where they
-    begin) go by the ratio of the legs: feet that stand still stand, and on the floor.
+    bones may be of other lengths, also those of joints that have positions in every frame (`_kept`). Then
+    places (of the hips, above the floor at height 0 and from where they begin) go by the ratio of the legs:
+    feet that stand still stand, and on the floor.
 
     Raises:
         RequestError: other joints, joints that rest differently or hang from others, or a joint that is
@@ -262,6 +264,7 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
     """
     order = _matched(clip, like)
     mine = like.skeleton
+    rest, kept = clip.skeleton.rest_translation[order], _kept(like) & _kept(clip)[order]
     clip = resample(clip, like.fps, smooth=True)
     translation = np.empty((len(clip), len(like.translated), 3))
     for column, joint in enumerate(like.translated):
@@ -270,10 +273,15 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
         translation[:, column] = (
             clip.translation[:, clip.translated.index(own)] if moves else mine.rest_translation[joint]
         )
-    rest = clip.skeleton.rest_translation[order]
+        bone = mine.rest_translation[joint]
+        if kept[joint] and not np.allclose(rest[joint], bone, atol=STILL):
+            # On a bone of another length; what it gives way by goes along.
+            long = float(np.linalg.norm(rest[joint]))
+            ratio = float(np.linalg.norm(bone)) / long if long > STILL else 1.0
+            translation[:, column] = bone + ratio * (translation[:, column] - rest[joint])
     scale = 1.0
     placed = [joint for joint in like.translated if order[joint] in clip.translated]
-    inner = [joint for joint in range(len(mine)) if joint not in placed]
+    inner = [joint for joint in range(len(mine)) if joint not in placed or kept[joint]]
     if not np.allclose(rest[inner], mine.rest_translation[inner], atol=STILL):
         bodies = find_mapping(clip.skeleton), find_mapping(mine)
         if all(body.usable for body in bodies):
@@ -292,6 +300,23 @@ def _bare(skeleton: Skeleton) -> Skeleton:
     """The skeleton without the namespace of a scene before its names: mixamorig1:Hips is Hips."""
     names = tuple(name.rpartition(":")[2] for name in skeleton.names)
     return replace(skeleton, names=names) if len({*names}) == len(names) and all(names) else skeleton
+
+
+def _kept(clip: Clip) -> np.ndarray:
+    """(J,) which joints below the hips have positions in every frame, and are about where they rest in 90 %.
+
+    Some programs write positions of every joint: what does not move against its parent hangs on a bone.
+    """
+    skeleton, columns = clip.skeleton, list(clip.translated)
+    kept = np.zeros(len(skeleton), bool)
+    if len(clip):
+        rest = skeleton.rest_translation[columns]
+        off = np.percentile(np.linalg.norm(clip.translation - rest, axis=-1), 90, axis=0)
+        kept[columns] = off < np.maximum(STILL, SWAY * np.linalg.norm(rest, axis=-1))
+    hips = hips_of(skeleton)
+    kept &= skeleton.below[:, hips]
+    kept[hips] = False
+    return kept
 
 
 def other_rig(clip: Clip, like: Clip) -> RequestError | None:
@@ -318,9 +343,13 @@ def _matched(clip: Clip, like: Clip) -> list[int]:
             (other.names, [other.parents[joint] for joint in order]),
         )
     )
-    bones = rotations.between(mine.rest_translation, other.rest_translation[order])
-    # What has its place in every frame rests nowhere.
-    bones[[joint for joint in like.translated if order[joint] in clip.translated]] = rotations.identity()
+    rest = np.stack([mine.rest_translation, other.rest_translation[order]])
+    bones = rotations.between(*rest)
+    # What moves against its parent rests nowhere, and what a short bone points at means nothing.
+    long = (np.linalg.norm(rest, axis=-1) > SHORT).all(axis=0)
+    told = _kept(like) & _kept(clip)[order] & long
+    placed = [joint for joint in like.translated if order[joint] in clip.translated]
+    bones[[joint for joint in placed if not told[joint]]] = rotations.identity()
     apart = np.maximum(
         rotations.angle(mine.rest_rotation, other.rest_rotation[order]),
         rotations.angle(rotations.identity(), bones),
