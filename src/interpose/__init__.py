@@ -415,6 +415,7 @@ def retarget(clip: Clip | str | Path, like: Clip | str | Path) -> Clip:
 
     Joints are turned from their T-pose as the other body's are; ways and heights go by the legs' lengths,
     floors are at height 0, and feet that stand still stand still. Clips of one rig keep their own rotations.
+    A clip begins over the same floor point.
 
     Args:
         clip: the motion, a clip or a path.

@@ -65,8 +65,10 @@ def test_bodies_stand_on_the_floor_whatever_they_do_and_wherever_the_rig_is(cmu_
 
 
 def test_a_part_of_a_clip_is_where_it_is_in_the_whole(cmu_walk, hands):
+    """But for the floor point over which it begins."""
     whole, part = retarget(cmu_walk, hands).positions(), retarget(cmu_walk.slice(100, 160), hands).positions()
-    assert np.abs(whole[100:160] - part).max() < 0.02
+    apart = whole[100:160] - part
+    assert np.abs(apart - apart[0, 0] * [1.0, 0.0, 1.0]).max() < 0.02
 
 
 def test_hips_sink_before_legs_are_torn_straight(cmu_walk, hands):
@@ -114,10 +116,24 @@ def test_who_lies_goes_neither_through_the_floor_nor_sinks(cmu_walk, hands):
 
 
 def test_it_follows_turns_and_ways_of_the_motion(cmu_walk, hands):
-    moved = Placement(0.7, (1.0, 0.0, -2.0)).of(cmu_walk, carriers(cmu_walk))
-    ratio = find_mapping(hands.skeleton).leg_length / find_mapping(cmu_walk.skeleton).leg_length
-    placed = Placement(0.7, (ratio, 0.0, -2.0 * ratio)).of(retarget(cmu_walk, hands), carriers(hands))
+    placement = Placement(0.7, (30.0, 0.0, -40.0))
+    moved = placement.of(cmu_walk, carriers(cmu_walk))
+    placed = placement.of(retarget(cmu_walk, hands), carriers(hands))
     assert np.allclose(retarget(moved, hands).positions(), placed.positions(), atol=1e-5)
+
+
+def test_it_begins_over_the_same_floor_point(cmu_walk, hands):
+    """On another rig and on a smaller body of its own, and the way from there goes by the legs."""
+    far = Placement(shift=(30.0, 0.0, 40.0)).of(cmu_walk, carriers(cmu_walk))
+    child = replace(far.skeleton, rest_translation=0.5 * far.skeleton.rest_translation)
+    for like in (hands, replace(far, skeleton=child, translation=0.5 * far.translation)):
+        ratio = find_mapping(like.skeleton).leg_length / find_mapping(far.skeleton).leg_length
+        before, after = (
+            clip.positions()[:, find_mapping(clip.skeleton)["Hips"]][:, [0, 2]]
+            for clip in (far, retarget(far, like))
+        )
+        assert np.allclose(after[0], before[0], atol=1e-9)
+        assert np.abs(after - after[0] - ratio * (before - before[0])).max() < 0.05
 
 
 def test_fingers_keep_their_mean_pose(cmu_walk, hands):

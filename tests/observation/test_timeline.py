@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
@@ -13,6 +14,7 @@ from interpose.formats import load
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.observation.timeline import Placement, fit, lay
+from interpose.skeletons.carrier import carriers, hips_of
 from interpose.skeletons.humanoid import reflect
 
 
@@ -64,6 +66,24 @@ def test_bodies_of_other_size_stand_on_the_floor(cmu_walk, run):
     toes = [cmu_walk.skeleton.index(name) for name in ("LeftToeBase", "RightToeBase")]
     before, after = (clip.positions()[:, toes, 1].min() for clip in (run, fitted))
     assert abs(before - after) < 0.02
+
+
+@pytest.mark.parametrize("goes", [False, True])
+@pytest.mark.parametrize("frames", [1, 60])
+def test_bodies_of_other_size_begin_over_the_same_floor_point(run, goes, frames):
+    """Also where hips hang from a root that stays at the origin; one that goes along begins there, too."""
+    run = under_root(run, goes)
+    far = Placement(0.0, (30.0, 0.0, 40.0)).of(run, carriers(run)).slice(0, frames)
+    skeleton = replace(run.skeleton, rest_translation=0.6 * run.skeleton.rest_translation)
+    fitted, scale = fit(far, replace(run, skeleton=skeleton))
+    before, after = (clip.positions() for clip in (far, fitted))
+    hips = hips_of(skeleton)
+    assert scale == pytest.approx(0.6)
+    assert np.allclose(after[0, hips, [0, 2]], before[0, hips, [0, 2]], atol=1e-9)
+    assert np.allclose(after[:, hips, 1], 0.6 * before[:, hips, 1], atol=1e-9)
+    assert np.allclose(after[: 1 if goes else None, 0], before[: 1 if goes else None, 0], atol=1e-9)
+    ways = [p[-1, hips, [0, 2]] - p[0, hips, [0, 2]] for p in (before, after)]
+    assert np.allclose(ways[1], 0.6 * ways[0], atol=1e-9)
 
 
 def _six_channels(clip: Clip) -> Clip:

@@ -43,7 +43,7 @@ def retarget(clip: Clip, like: Clip) -> Clip:
 
     Clips of one rig, people's sizes apart, keep the local rotations of all joints. Else joints that are not
     among the 22 canonical ones (fingers, twists, targets) are as in `like` in the mean, and a root above the
-    hips goes along if it does so there. Floors are at height 0.
+    hips goes along if it does so there. Floors are at height 0, and clips begin over the same floor point.
 
     Args:
         clip: F frames of a humanoid.
@@ -107,6 +107,9 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     base = like.with_motion(np.tile(held, frames), np.tile(like.translation.mean(axis=0), frames))
     base = replace(base, fps=clip.fps)
     root, goals = mine.root_over(points, turned[:, 0]), points[:, tips] * mine.hand
+    # Ways go by the legs from where they begin, so that who starts beside something still does.
+    begins = (theirs.root(clip)[0] - root[0]) * [1.0, 0.0, 1.0]
+    root, goals = root + begins, goals + begins * mine.hand
     root[:, 1] += over / mine.scale
     made = mine.to_clip(turned, root, base)
     root[:, 1] -= _sunk(made, goals, toes)

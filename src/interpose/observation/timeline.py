@@ -255,8 +255,8 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
 
     Joints keep their local rotations, so their names (namespaces apart) and rest poses must be the same;
     bones may be of other lengths, also those of joints that have positions in every frame (`_kept`). Then
-    places (of the hips, above the floor at height 0 and from where they begin) go by the ratio of the legs:
-    feet that stand still stand, and on the floor.
+    places (of the hips, above the floor at height 0 and from where they begin, wherever a root that they hang
+    from stays) go by the ratio of the legs: feet that stand still stand, and on the floor.
 
     Raises:
         RequestError: other joints, joints that rest differently or hang from others, or a joint that is
@@ -292,8 +292,24 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
                 column = like.translated.index(joint)
                 pivot = translation[0, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
                 translation[:, column] = pivot + scale * (translation[:, column] - pivot)
-    fitted = replace(like, rotation=clip.rotation[:, order], translation=translation, name=clip.name)
-    return replace(fitted, source=None), scale
+    fitted = replace(
+        like, rotation=clip.rotation[:, order], translation=translation, name=clip.name, source=None
+    )
+    return (fitted if scale == 1 else _from(clip, fitted)), scale
+
+
+def _from(clip: Clip, fitted: Clip) -> Clip:
+    """`fitted` with hips that begin over the same floor point as in the clip, below a root that stays."""
+    top = carriers(fitted)[0]
+    above = fitted.skeleton.parents[top]
+    if above < 0 or not len(clip):
+        return fitted
+    begins, now = (some.slice(0, 1).positions()[0, hips_of(some.skeleton)] for some in (clip, fitted))
+    back = rotations.conjugate(fitted.kinematics()[0][:, above])
+    shift = rotations.rotate(back, (begins - now) * [1.0, 0.0, 1.0])
+    translation = fitted.translation.copy()
+    translation[:, fitted.translated.index(top)] += shift / fitted.skeleton.scale_above[top]
+    return fitted.with_motion(fitted.rotation, translation)
 
 
 def _bare(skeleton: Skeleton) -> Skeleton:
