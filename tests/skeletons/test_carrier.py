@@ -94,6 +94,60 @@ def test_a_root_on_the_floor_that_turns_stays_upright_and_on_it(cmu_walk):
     assert np.abs(at[:, 0, 1]).max() < 1e-9
 
 
+def yaws(clip):  # type: ignore[no-untyped-def]
+    """(2, F) degrees about the vertical by which root and hips are turned since the first frame."""
+    turned = clip.kinematics()[0]
+    since = rotations.multiply(turned[:, :2], rotations.conjugate(turned[0, :2]))
+    return np.degrees(np.unwrap(2 * np.arctan2(since[..., 2], since[..., 0]), axis=0)).T
+
+
+def apart(clip):  # type: ignore[no-untyped-def]
+    """(F,) degrees by which root and hips face elsewhere."""
+    root, hips = yaws(clip)
+    return np.abs((root - hips + 180) % 360 - 180)
+
+
+@pytest.fixture(scope="module")
+def led(cmu_walk):  # type: ignore[no-untyped-def]
+    """A walk whose root, on the floor, turns along with the hips and more smoothly; own axes with Z up."""
+    rigged = under_root(cmu_walk, True)
+    turned, placed = rigged.kinematics()
+    yaw = rotations.about("Y", np.radians(gaussian_filter1d(yaws(rigged)[1], 6)))
+    led = moved(rigged, {0: (rotations.multiply(yaw, turned[:, 0]), placed[:, 0])})
+    return moved(led, {1: (turned[:, 1], placed[:, 1])})
+
+
+@pytest.mark.parametrize("gap", [(40, 120), (60, 170), (100, 209)])
+def test_a_root_that_turns_along_does_so_in_a_gap(cmu_walk, led, gap):
+    """It turned the other way round, up to 178 degrees from where the hips faced."""
+    done, same = (interpose.fill(clip, gap, method="small").clip for clip in (led, cmu_walk))
+    assert np.ptp(yaws(done)[1][slice(*gap)]) > 35
+    assert apart(done).max() < apart(led).max() + 3
+    turns = [np.abs(np.diff(yaws(clip)[0], 2)).max() for clip in (done, led)]
+    assert turns[0] < 2 * turns[1], "as smoothly"
+    body = [1, *range(TARGET + 1, len(led.skeleton))]
+    assert np.abs(done.positions()[:, body] - same.positions()).max() < 0.05
+    seen = np.setdiff1d(np.arange(len(led)), np.arange(*gap))
+    assert done.rotation[seen].tobytes() == led.rotation[seen].tobytes()
+    assert np.abs(done.root[:, 1]).max() < 1e-9
+
+
+def test_who_is_brought_onto_a_rig_whose_root_turns_along_turns_it_along(cmu_walk, led):
+    """It was turned as in the mean, however the body was."""
+    done = interpose.retarget(cmu_walk, led.slice(0, 90))
+    assert np.ptp(yaws(done)[0]) > 150
+    assert apart(done).max() < apart(led).max() + 3
+    without = interpose.retarget(cmu_walk, under_root(cmu_walk, True).slice(0, 90))
+    body = [1, *range(TARGET + 1, len(led.skeleton))]
+    assert np.allclose(done.positions()[:, body], without.positions()[:, body], atol=1e-9)
+    assert np.ptp(without.rotation[:, 0], axis=0).max() < 1e-9, "it did not turn there"
+
+
+def test_a_root_that_turns_along_does_so_on_the_way_to_another_clip(led):
+    done = interpose.stitch([led.slice(0, 80), led.slice(120, 200)], method="small")
+    assert apart(done.clip).max() < apart(led).max() + 3
+
+
 def test_a_path_leads_the_hips(rigged, cmu_walk):
     gap, middle = (140, 190), 165
     point = cmu_walk.root[middle, [0, 2]] + [0.4, 0.2]

@@ -198,7 +198,8 @@ class _Work:
         current = self.current
         if self.layer and self.layer.pins:
             current = pins.meet(current, known, self.layer.pins)
-        current = merge(held(rooted(current, known.translation), clip.source), self.hidden, known)
+        current = rooted(current, known.translation, known.rotation)
+        current = merge(held(current, clip.source), self.hidden, known)
         for span in self.spans:
             for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():
                 which = f"frames {ask.first + start} to {ask.first + stop - 1}"

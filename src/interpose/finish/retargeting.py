@@ -43,7 +43,8 @@ def retarget(clip: Clip, like: Clip) -> Clip:
 
     Clips of one rig, people's sizes apart, keep the local rotations of all joints. Else joints that are not
     among the 22 canonical ones (fingers, twists, targets) are as in `like` in the mean, and a root above the
-    hips goes along if it does so there. Floors are at height 0, and clips begin over the same floor point.
+    hips goes and turns along if it does so there. Floors are at height 0, and clips begin over the same floor
+    point.
 
     Args:
         clip: F frames of a humanoid.
@@ -118,10 +119,10 @@ def _brought(clip: Clip, like: Clip) -> Clip:
         rotation = reach(made.skeleton, leg, made.rotation, *made.kinematics(), _foot(made, leg, goals, toes))
         made = made.with_motion(rotation, made.translation)
     made = _laid(made, mine, points)
-    # A root above the hips goes along if it does so in the other clip.
+    # A root above the hips goes and turns along if it does so in the other clip.
     whole = joined(like, [like, made])
     known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
-    done = rooted(whole, known).slice(len(like), len(whole))
+    done = rooted(whole, known, known, len(like)).slice(len(like), len(whole))
     return replace(done, fps=clip.fps, name=clip.name, source=None)
 
 

@@ -9,16 +9,22 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+import scipy
 
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP
+from interpose.geometry.time import hermite
 from interpose.skeletons.mapping import find_mapping
 
 NEAR = 0.3  # metres over the floor within which a root stays that goes along with the hips
 STILL = 1e-3  # metres, and radians: what moves less against its parent does not move
 # What of a root's height (metres) changes, and what points up at it leans (radians), at most, is none.
 LEVEL, LEANS = 2e-3, 2e-3
+# A root turns along with the hips that faces as they do to so many radians, over so many seconds (standard
+# deviations), and turns that much less against them than by itself (a share). In a gap how it is turned
+# against them fades into what is usual over so many seconds.
+ASIDE, WIDTHS, LESS, EASE = np.radians(45), (0.0, 0.05, 0.1, 0.2, 0.4), 0.5, 0.5
 
 
 def hips_of(skeleton: Skeleton) -> int:
@@ -83,14 +89,18 @@ def moved(clip: Clip, places: Mapping[int, tuple[np.ndarray, np.ndarray]]) -> Cl
     return clip.with_motion(rotation, translation)
 
 
-def rooted(clip: Clip, known: np.ndarray) -> Clip:
+def rooted(clip: Clip, known: np.ndarray, turns: np.ndarray, cut: int = 0) -> Clip:
     """The clip with a root above the hips where it belongs in frames where the place of neither is known.
 
     As far aside of them as before and after, if it goes along with them in all known frames (what game
-    engines call root motion); or where it was, if it stands still in these. What is upright in all known
-    frames, or at one height, stays so. The body stays where it is.
+    engines call root motion); or where it was, if it stands still in these. If it turns along with them, it
+    does so, too, as smoothly. What is upright in all known frames, or at one height, stays so. The body stays
+    where it is.
 
-    known: (F, J) which local translations are.
+    Args:
+        clip: F frames.
+        known, turns: (F, J) which local translations, and which local rotations, are known.
+        cut: the frame with which another motion begins.
     """
     hips = hips_of(clip.skeleton)
     above = [joint for joint in clip.skeleton.ancestors(hips) if joint in clip.translated]
@@ -112,8 +122,65 @@ def rooted(clip: Clip, known: np.ndarray) -> Clip:
         there = placed[:, root].copy()
     if np.ptp(placed[both, root, 1]) < LEVEL:
         there[free, 1] = placed[both, root, 1].mean()
-    led = moved(clip, {root: (_upright(turned[:, root], both, free), there)})
+    turn = _upright(turned[:, root], both, free)
+    both = both & turns[:, [hips, root]].all(axis=1)
+    free = free & np.logical_not(turns[:, [hips, root]].any(axis=1))
+    if clip.skeleton.below[list(find_mapping(clip.skeleton).mapped[1]), hips].all():
+        turn = _facing(turn, turned[:, hips], both, free, clip.fps, cut)
+    led = moved(clip, {root: (turn, there)})
     return moved(led, {hips: (turned[:, hips], placed[:, hips])})
+
+
+def _facing(
+    root: np.ndarray, hips: np.ndarray, known: np.ndarray, free: np.ndarray, fps: float, cut: int
+) -> np.ndarray:
+    """Rotations of a root (F, 4), those that are `free` (F,) turned about the vertical to face as the hips
+    (F, 4) do, if all that are `known` (F,) turn along with these."""
+    if known.sum() < 2 or not free.any():
+        return root
+    own, theirs = _unit(_yaw(root, known)), _yaw(hips, known)
+    parts = [part for part in np.split(theirs, [cut]) if len(part)]
+    against = [
+        own * _unit(np.concatenate([_smooth(part, width * fps) for part in parts])).conj() for width in WIDTHS
+    ]
+    best = min(against, key=lambda some: float(np.std(some[known])))
+    mean = best[known].mean()
+    off, turns = np.angle(best * mean.conj()), np.std(own[known])
+    if turns < STILL or np.std(best[known]) > LESS * turns or np.abs(off[known]).max() > ASIDE:
+        return root
+    change = _over(off, known, EASE * fps) - off
+    there = rotations.multiply(rotations.about("Y", change), root)
+    return np.where(free[:, None], rotations.normalize(there), root)
+
+
+def _yaw(turned: np.ndarray, known: np.ndarray) -> np.ndarray:
+    """(F,) how rotations (F, 4) are turned about the vertical since the first one that is known, as complex
+    numbers: shorter, the more they are tilted, until there is no telling."""
+    since = rotations.multiply(turned, rotations.conjugate(turned[known][0]))
+    return np.asarray((since[:, 0] + 1j * since[:, 2]) ** 2)
+
+
+def _over(off: np.ndarray, known: np.ndarray, reach: float) -> np.ndarray:
+    """(F,) angles led from those that are known to the next, at their pace over `reach` frames beside them;
+    at both ends they come to rest."""
+    at = np.flatnonzero(known)
+    led = np.interp(np.arange(len(off)), at, off[at])
+    pace = np.diff(led, prepend=led[:1], append=led[-1:])
+    knots = np.unique([0, *at, len(off) - 1])
+    for a, b in zip(knots[:-1], knots[1:]):
+        if b - a > 1:
+            y, other, v, w = (np.array([some]) for some in (led[a], led[b], pace[a], pace[b + 1]))
+            t, length = np.arange(b - a + 1.0), np.array(float(b - a))
+            led[a : b + 1] = hermite(y, other, v, w, t, length, reach)[:, 0]
+    return led
+
+
+def _unit(numbers: np.ndarray) -> np.ndarray:
+    return np.asarray(numbers / np.maximum(np.abs(numbers), 1e-12))
+
+
+def _smooth(values: np.ndarray, width: float) -> np.ndarray:
+    return np.asarray(scipy.ndimage.gaussian_filter1d(values, width, mode="nearest")) if width else values
 
 
 def _upright(turned: np.ndarray, known: np.ndarray, free: np.ndarray) -> np.ndarray:
