@@ -23,6 +23,7 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import rooted
+from interpose.skeletons.targets import seated
 
 STOOD = "what the body stands on tells where it is"
 STEPS = "the body turns on the spot, in steps"
@@ -195,10 +196,13 @@ class _Work:
     def completion(self) -> Completion:
         """What is observed, bit for bit, with what was completed; and what is to be said of it."""
         ask, clip, known = self.ask, self.clip, self.known
-        current = self.current
-        if self.layer and self.layer.pins:
-            current = pins.meet(current, known, self.layer.pins)
+        current, pinned = self.current, self.layer.pins if self.layer else ()
+        if pinned:
+            current = pins.meet(current, known, pinned)
         current = rooted(current, known.translation, known.rotation)
+        # What is pinned itself stays where that puts it.
+        stays = np.isin(clip.skeleton.names, [pin.joint for pin in pinned])
+        current = seated(current, known.translation, known.rotation | stays)
         current = merge(held(current, clip.source), self.hidden, known)
         for span in self.spans:
             for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():

@@ -24,6 +24,7 @@ from interpose.observation.timeline import fit, joined, other_rig
 from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping
 from interpose.skeletons.carrier import rooted
 from interpose.skeletons.humanoid import SHORT
+from interpose.skeletons.targets import seated
 
 # Metres, of a body with the canonical leg: so far from RESTS do toes rest in one rig or another. Stances tell
 # it: toes slower than this (metres a second), for so many seconds.
@@ -42,9 +43,9 @@ def retarget(clip: Clip, like: Clip) -> Clip:
     """The motion of a clip on the skeleton of another one.
 
     Clips of one rig, people's sizes apart, keep the local rotations of all joints. Else joints that are not
-    among the 22 canonical ones (fingers, twists, targets) are as in `like` in the mean, and a root above the
-    hips goes and turns along if it does so there. Floors are at height 0, and clips begin over the same floor
-    point.
+    among the 22 canonical ones (fingers, twists) are as in `like` in the mean, but a root above the hips goes
+    and turns along, and targets sit on feet and hands, as they do there. Floors are at height 0, and clips
+    begin over the same floor point.
 
     Args:
         clip: F frames of a humanoid.
@@ -119,10 +120,12 @@ def _brought(clip: Clip, like: Clip) -> Clip:
         rotation = reach(made.skeleton, leg, made.rotation, *made.kinematics(), _foot(made, leg, goals, toes))
         made = made.with_motion(rotation, made.translation)
     made = _laid(made, mine, points)
-    # A root above the hips goes and turns along if it does so in the other clip.
+    # A root above the hips goes and turns along, and targets stay on feet and hands, if they do so in the
+    # other clip.
     whole = joined(like, [like, made])
     known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
-    done = rooted(whole, known, known, len(like)).slice(len(like), len(whole))
+    whole = seated(rooted(whole, known, known, len(like)), known, known)
+    done = whole.slice(len(like), len(whole))
     return replace(done, fps=clip.fps, name=clip.name, source=None)
 
 
