@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import shutil
 import subprocess
 import sys
 import tomllib
@@ -14,6 +15,7 @@ import pytest
 import interpose
 import interpose.cli
 from interpose.formats import load
+from interpose.methods import weights
 
 SOURCE = Path(interpose.__file__).parents[1]
 
@@ -186,6 +188,20 @@ def test_settings_of_a_recipe_are_changed_by_name(run):
     done = run("train", "cae", "--out", "x", "--set", "network=gan")
     assert done.code == 2
     assert "cae, vanilla, holden" in done.err
+
+
+def test_own_weights_are_not_named_like_a_method(run, take):
+    """`--method small` would go on to take the installed one."""
+    pytest.importorskip("torch")
+    done = run("train", "--from", "small", "--data", ".", "--out", "small")
+    assert done.code == 2
+    assert "small is the name of a method" in done.err
+    card = weights.card("cae")
+    Path("cae").mkdir()
+    for path in (card.path, card.onnx):
+        shutil.copy(path, Path("cae") / path.name)
+    assert "it is not clear what cae is" in run("fill", take, "--gap", "60:90", "--method", "cae").err
+    assert run("fill", take, "--gap", "60:90", "--method", "./cae").code == 0
 
 
 def test_networks_are_not_trained_on_test_performers(run, tmp_path):

@@ -39,6 +39,16 @@ def test_what_differs_and_what_came_of_it(runs):
     assert "gap15" in error.value.why
 
 
+def test_a_run_that_saw_who_it_is_judged_on_is_no_measure(runs):
+    for run, splits in zip(runs, (["train"], ["train", "validation"])):
+        settings = json.loads((run / "settings.json").read_text())
+        (run / "settings.json").write_text(json.dumps({**settings, "splits": splits}))
+    result = compare(runs)
+    assert result.differs(result.runs[1])["splits"] == "train+validation"
+    assert "no measure: squared." in str(result)
+    assert "no measure" not in str(compare(runs[:1]))
+
+
 @pytest.mark.parametrize("spoil", ["no log", "empty", "no json", "another file", "no folder"])
 def test_what_is_no_run(runs, spoil):
     log = runs[1] / "log.jsonl"

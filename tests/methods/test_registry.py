@@ -14,7 +14,9 @@ import pytest
 
 import interpose
 from interpose.errors import FileError, RequestError
+from interpose.finish import complete
 from interpose.methods import classical, registry, weights
+from interpose.observation import Gap, Observation
 
 
 @pytest.fixture
@@ -102,6 +104,16 @@ def copied(name: str, folder: Path) -> Path:
     for path in (card.path, card.onnx):
         shutil.copy(path, folder / f"mine{path.suffix}")
     return folder
+
+
+@pytest.mark.parametrize("name", ["cae", "cmib", "small"])
+def test_a_folder_of_weights_is_a_method_of_that_name(name, tmp_path, cmu_walk):
+    """Only so does a report that names it bring the same weights again."""
+    folder = copied(name, tmp_path / "mine")
+    method = registry.get(str(folder))
+    assert method.name == str(folder)
+    done = complete(cmu_walk, Observation.from_gaps(cmu_walk, [Gap(60, 90)]), method)
+    assert [gap.method for gap in done.report.gaps] == [str(folder)]
 
 
 def test_weights_that_were_written_anew_are_read_anew(tmp_path, cmu_walk):

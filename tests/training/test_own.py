@@ -50,11 +50,16 @@ def test_of_many_takes_each_fifth_is_held_out(takes):
 
 
 def test_what_interpose_made_is_no_take(takes):
+    """What else lies beside a take, as the labels of Bandai-Namco's, is no report."""
     shutil.copy(takes / "a.bvh", takes / "a.filled.bvh")
-    (takes / "a.filled.json").write_text("{}")
+    report = dict.fromkeys(("interpose", "method", "seed", "gaps", "open"))
+    (takes / "a.filled.json").write_text(json.dumps(report))
+    (takes / "a.json").write_text('{"label": "walk"}')
     said: list[str] = []
-    assert "a.filled.bvh" not in own_pack(takes, 56, said.append).names
-    assert any("a .json lies beside it" in line for line in said)
+    names = own_pack(takes, 56, said.append).names
+    assert "a.filled.bvh" not in names
+    assert "a.bvh" in names
+    assert any("interpose made it" in line for line in said)
     with pytest.raises(FileError, match="there is no folder"):
         own_pack(takes / "none", 56)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from json import dumps, loads
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -76,6 +76,8 @@ class Outputs:
 
     def earlier(self, verb: str) -> dict[str, Any] | None:
         """The report of an earlier run of the verb that left all of these files, or None."""
+        from interpose.observation.gapfile import is_report, read_json
+
         report = read_json(self.report)
         whole = is_report(report) and report.get("verb") == verb and all(map(Path.exists, self.all))
         return report if whole else None
@@ -94,6 +96,7 @@ class Outputs:
                 say that NAME.json is written, too.
         """
         from interpose.formats import FORMATS
+        from interpose.observation.gapfile import is_report, read_json
 
         if self.clip.suffix.lower() not in FORMATS:
             folder = f" Or make the folder {self.clip} first." if not self.clip.suffix else ""
@@ -121,19 +124,6 @@ class Outputs:
                 raise RequestError(
                     what, "the file exists already", "Choose another name with -o, or add --force."
                 )
-
-
-def read_json(path: Path) -> Any:
-    """What a JSON file holds, or None when there is nothing to be made of it."""
-    try:
-        return loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return None
-
-
-def is_report(content: Any) -> bool:
-    """Whether what a file holds is a report that this program wrote, whole."""
-    return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()
 
 
 def write_text(path: Path, text: str) -> None:

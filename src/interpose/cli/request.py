@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from interpose.cli.console import names
-from interpose.cli.outputs import is_report, read_json
 from interpose.cli.reading import Reading, full_names, joints_of, split_names
 from interpose.clip import Clip
 from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
 from interpose.observation import Gap, Part, Pin
-from interpose.observation.gapfile import read_gaps
+from interpose.observation.gapfile import is_report, read_gaps, read_json
 from interpose.observation.observation import frame_at
 from interpose.observation.scan import NO_GAPS, STUCK, scan, to_gaps
 
@@ -403,6 +402,11 @@ def check_method(name: str, license: str) -> None:
     choices = list(dict.fromkeys(["auto", *registry.names()]))
     if name not in choices and not Path(name).is_dir():
         raise unknown("method", name, choices)
+    if name in choices and any(Path(name).glob("*.onnx")):
+        why = "there is a method of that name, and a folder with weights here"
+        raise RequestError(
+            f"it is not clear what {name} is", why, f"Write ./{name} for the folder, or rename it."
+        )
     if name != "auto":
         # Of those that have weights the card, which is refused where it may not be used.
         getattr(registry.get(name), "card", None)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import App, Parameter
 
-from interpose.cli.console import say, say_table
+from interpose.cli.console import names, say, say_table
 from interpose.cli.reading import split_names
 from interpose.cli.research import needs_torch, shown
 from interpose.errors import FileError, RequestError, unknown
@@ -149,7 +149,7 @@ def own(
         from interpose.training.base import JUDGED, BaseSettings, judge, train_base
         from interpose.training.export import export_base
     from interpose.datasets.own import own_pack
-    from interpose.methods import weights
+    from interpose.methods import registry, weights
     from interpose.training.budget import Budget
 
     begin = weights.card(from_)
@@ -161,6 +161,11 @@ def own(
         )
     if any(out.glob("*.onnx")):
         raise RequestError(f"{out} has weights already", "they would be replaced", "Name another --out.")
+    if str(out) in (taken := {"auto", *registry.names()}):
+        why = f"--method {out} would go on to take the installed one"
+        raise RequestError(
+            f"{out} is the name of a method", why, f"Choose another --out than {names(sorted(taken))}."
+        )
     asked = Budget.parse(budget)
     # Gently: what it knows of all motion is to stay.
     gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0)

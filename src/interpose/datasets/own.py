@@ -11,6 +11,7 @@ from interpose.datasets.pack import Pack, Part, assemble, unfit
 from interpose.errors import FileError, InterposeError
 from interpose.formats import FORMATS, load
 from interpose.geometry.time import resample
+from interpose.observation.gapfile import is_report, read_json
 
 NAME = "own"
 # Each fifth clip is held out; of fewer clips the last fifth of each.
@@ -38,8 +39,8 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
     paths = sorted(path for path in folder.rglob("*") if path.suffix.lower() in FORMATS)
     for path in paths:
         name = str(path.relative_to(folder))
-        if path.with_suffix(".json").exists():
-            progress(f"left out: {name} (a .json lies beside it, as beside what interpose makes)")
+        if is_report(read_json(path.with_suffix(".json"))):
+            progress(f"left out: {name} (the report beside it says that interpose made it)")
             continue
         try:
             clip = resample(load(path), FPS)

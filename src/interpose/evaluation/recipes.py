@@ -74,7 +74,9 @@ class Recipes:
         return markdown(head, rows)
 
     def __str__(self) -> str:
-        return f"Validation performers, at the end of each run.\n\n{self.table()}"
+        seen = [run.name for run in self.runs if "validation" in run.settings.get("splits", "")]
+        warning = f"\n\nTrained on these performers, too, so no measure: {', '.join(seen)}." * bool(seen)
+        return f"Validation performers, at the end of each run.\n\n{self.table()}{warning}"
 
 
 def compare(folders: Sequence[Path], figures: Sequence[str] = ()) -> Recipes:
@@ -105,9 +107,10 @@ def _read(folder: Path) -> Run:
             why,
             "Name folders that interpose train wrote, once they are done.",
         ) from None
+    lists = {name: "+".join(map(str, value)) for name, value in settings.items() if isinstance(value, list)}
     plain = {
         name: value
-        for name, value in settings.items()
+        for name, value in {**settings, **lists}.items()
         if isinstance(value, int | float | str) and name not in ("commit", "budget", "processes")
     }
     return Run(folder.name, plain, last)

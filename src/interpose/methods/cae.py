@@ -96,10 +96,11 @@ class Cae:
 
     Attributes:
         trained: the weights; the installed ones without any.
+        name: of the method, or of the folder with the weights.
     """
 
     trained: weights.Card | None = None
-    name = "cae"
+    name: str = "cae"
 
     @property
     def card(self) -> weights.Card:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -82,11 +82,12 @@ class Cmib:
     Attributes:
         action: a label of its card; "" leaves it open.
         trained: the weights; the installed ones without any.
+        name: of the method, or of the folder with the weights.
     """
 
     action: str = ""
     trained: weights.Card | None = None
-    name = "cmib"
+    name: str = "cmib"
 
     @property
     def card(self) -> weights.Card:
@@ -96,7 +97,7 @@ class Cmib:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
         if action not in self.card.labels:
             raise unknown("action", action, [label for label in self.card.labels if label])
-        return Cmib(action, self.trained)
+        return replace(self, action=action)
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why not: no humanoid, single joints, no key on one side, or more frames than it knows."""

@@ -45,7 +45,8 @@ class Raw:
 class Method(Protocol):
     """Something that completes a clip."""
 
-    name: str
+    @property
+    def name(self) -> str: ...
 
     def refuses(self, clip: Clip, gap: Gap) -> str | None:
         """Why this method cannot fill this gap of this clip, or None if it can."""

@@ -47,6 +47,19 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
     return [_gap(entry, clip, f"gap number {number} in {path}") for number, entry in enumerate(entries, 1)]
 
 
+def read_json(path: Path) -> Any:
+    """What a JSON file holds, or None when there is nothing to be made of it."""
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+
+
+def is_report(content: Any) -> bool:
+    """Whether what a file holds is a report that this program wrote, whole."""
+    return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()
+
+
 def _gap(entry: Any, clip: Clip, where: str) -> Gap:
     """One entry of a clip; `where` names it in errors."""
 

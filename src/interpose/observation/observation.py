@@ -222,7 +222,8 @@ class Observation:
     ) -> tuple[Clip, Observation]:
         """A finite clip and its observation from arrays in which NaN marks missing values.
 
-        rotation: (F, J, 4); translation: (F, K, 3) as in Clip.
+        rotation: (F, J, 4); translation: (F, K, 3) as in Clip. A quaternion, or a vector, with a NaN in it is
+        missing as a whole: of a place of which two coordinates are known nothing is.
         """
         translated = translated or skeleton.roots
         rotation, translation = np.array(rotation, float), np.array(translation, float)
