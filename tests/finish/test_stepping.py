@@ -108,6 +108,13 @@ def test_who_walks_or_lies_does_not_turn_on_the_spot(standing, cmu_walk):
     assert not filled(clip.with_motion(lying, clip.translation), known)[1]
 
 
+def test_amid_known_motion_the_method_knows_better(standing):
+    clip, known = keys(standing, 30, 90)
+    first = np.maximum(np.arange(-1, len(clip)), 0)
+    held = clip.with_motion(clip.rotation[first], clip.translation[first])
+    assert not filled(held, Observation(known.rotation[first], known.translation[first]))[1]
+
+
 def test_what_is_known_of_a_leg_stays(standing):
     clip, known = keys(standing, 30, 90)
     shin = standing.skeleton.names.index("LeftLeg")
