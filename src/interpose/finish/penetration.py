@@ -46,6 +46,7 @@ PAIRS = (
 )
 LIMIT = 0.05  # metres: deeper is worth a word
 BESIDE = 2.0  # seconds on both sides that are looked at as well
+AS_DEEP = 1e-3  # metres further are as deep
 
 
 def segment_distance(p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
@@ -98,7 +99,7 @@ def deepest(clip: Clip, start: int, stop: int, first: int = 0) -> tuple[float, s
     frame, pair = np.unravel_index(inside.argmax(), inside.shape)
     depth = float(inside[frame, pair])
     around = np.delete(found[:, pair], np.s_[start - lo : stop - lo])
-    if depth <= LIMIT or depth <= around.max(initial=0.0):
+    if depth <= max(LIMIT, around.max(initial=0.0) + AS_DEEP):
         return depth, ""
     one, other = pairs[pair]
     where = f"at frame {first + start + int(frame)}"
