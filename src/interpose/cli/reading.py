@@ -79,8 +79,8 @@ class Reading:
         from interpose.formats import FORMATS
 
         told = {one: FORMATS[one.suffix.lower()].options for one in paths if one.suffix.lower() in FORMATS}
-        fields = {"unit": "unit", "up": "up", "joint_positions": "joint_positions"}
-        fields |= {"skeleton": "skeleton", "file_fps": "fps"}
+        options = ("unit", "up", "joint_positions", "skeleton", "fps")
+        fields = {"file_fps" if option == "fps" else option: option for option in options}
         others = [
             field
             for field, option in fields.items()
