@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -104,44 +105,6 @@ def _seconds(value: float) -> str:
     return f"{value:.2f} s"
 
 
-def _figure(points: np.ndarray, head: np.ndarray | None, drawn: Body, colors: list[str], scale: float) -> str:
-    """SVG of one pose: points (J, 3) in pixels and depth (towards the viewer), far bones first."""
-    parts: list[tuple[float, str, str]] = []
-    for joint, parent in enumerate(drawn.parents):
-        if parent < 0:
-            if joint not in drawn.parents:
-                x, y, depth = points[joint]
-                dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colors[joint]}"/>'
-                parts.append((depth, "", dot))
-            continue
-        (x1, y1, d1), (x2, y2, d2) = points[parent], points[joint]
-        style = f'stroke="{colors[joint]}" stroke-width="{max(drawn.thickness[joint] * scale, 1.2):.1f}"'
-        parts.append(((d1 + d2) / 2, style, f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}"))
-    if head is not None:
-        x, y, depth = head
-        radius = drawn.head_radius * scale
-        circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colors[drawn.head]}"/>'
-        parts.append((depth, "", circle))
-    parts.sort(key=lambda part: part[0])
-    out, run, open_style = [], "", ""
-    for _, style, shape in [*parts, (0.0, "", "")]:
-        if style != open_style and run:
-            out.append(f'<path {open_style} d="{run}"/>')
-            run = ""
-        if style:
-            run += shape
-        else:
-            out.append(shape)
-        open_style = style
-    return "".join(out)
-
-
-def _shades(color: str, drawn: Body) -> list[str]:
-    """A color a bone: left limbs darker, right ones lighter."""
-    tones = {-1: figure.mix(color, "#000000", 0.28), 0: color, 1: figure.mix(color, "#ffffff", 0.38)}
-    return [tones[side] for side in drawn.sides]
-
-
 def strip(
     takes: Sequence[Take],
     parents: Sequence[int],
@@ -187,14 +150,65 @@ def strip(
     )
     start, stop = figure.window(span or excerpt(missing, frames, fps), frames)
     shown = choose_frames(missing, start, stop, count)
+    inside = [gap for gap in missing if gap.start < stop and gap.stop > start]
+    layout = _layout(positions, parents, names, shown, inside)
+    svg = [
+        *_frame(title, layout),
+        *(line for gap in figure.merged(inside) for line in _gap(*gap, layout, fps)),
+        *(line for row, take in enumerate(takes) for line in _row(row, take, layout, missing)),
+        *_times(layout, fps),
+        "</svg>\n",
+    ]
+    result = "\n".join(svg)
+    if path is not None:
+        Path(path).write_text(result, encoding="utf-8")
+    return result
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where everything is.
+
+    Attributes:
+        shown: the frames whose figures are drawn, n of them.
+        drawn: what is drawn of the body.
+        poses: (takes, n, J, 3) metres right, up and towards the viewer, beside the middle of a figure's slot.
+        heads: (takes, n, 3), likewise; None without heads.
+        scale: pixels a metre.
+        edges: (n + 1,) pixels, of the slots.
+        stands: (n,) pixels, where the middle of a figure is.
+        row, below, height: pixels, of a take's row, of what is under its floor, and of the picture.
+    """
+
+    shown: list[int]
+    drawn: Body
+    poses: np.ndarray
+    heads: np.ndarray | None
+    scale: float
+    edges: np.ndarray
+    stands: np.ndarray
+    row: float
+    below: float
+    height: float
+
+    @property
+    def bottom(self) -> float:
+        """Where the rows end."""
+        return self.height - BOTTOM
+
+
+def _layout(
+    positions: list[np.ndarray],
+    parents: Sequence[int],
+    names: Sequence[str] | None,
+    shown: list[int],
+    inside: list[Span],
+) -> _Layout:
+    """The figures of all takes in equal slots, by what the first of them does in the gaps `inside`."""
     reference = positions[0]
     drawn = figure.body(reference, parents, names)
     floor = figure.floor_height(reference[shown], drawn.feet)
-    inside = [gap for gap in missing if gap.start < stop and gap.stop > start]
-    towards, travels = figure.heading(reference, drawn, inside)
-    camera = view(towards, travels)
-
-    # Poses beside their slot's middle: (takes, figures, J, 3) right, up, towards the viewer, in metres.
+    camera = view(*figure.heading(reference, drawn, inside))
     middle = reference[shown, :1] * (1 - figure.UP) + floor * figure.UP
     poses = np.stack([values[shown] - middle for values in positions]) @ camera.T
     heads = None
@@ -202,9 +216,8 @@ def strip(
         centers = [drawn.head_center(values[shown]) for values in positions]
         heads = (np.stack(centers) - middle[:, 0]) @ camera.T
 
-    tall = float(
-        (poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())) + 0.12
-    )
+    top = poses[..., 1].max() if heads is None else max(poses[..., 1].max(), heads[..., 1].max())
+    tall = float(top + 0.12)
     # How far each figure reaches to either side; a take that drifts far away may leave its slot.
     low, high = poses[..., 0].min(axis=2) - 0.06, poses[..., 0].max(axis=2) + 0.06
     low = np.maximum(low.min(axis=0), low[0] - DRIFT)
@@ -213,94 +226,138 @@ def strip(
     edges += LEFT
     below = max(0.0, float(-np.percentile(poses[..., 1], 0.5))) * scale
     row = tall * scale + below + 34
-    height = TOP + row * len(takes) + BOTTOM
     center = (edges[:-1] + edges[1:]) / 2
     # Nothing leaves the picture: drifting takes push their figure inwards, in all rows alike.
     first, last = poses[..., 0].min(axis=(0, 2)) * scale, poses[..., 0].max(axis=(0, 2)) * scale
     stands = np.maximum(np.minimum(center - (low + high) / 2 * scale, WIDTH - 10 - last), 10 - first)
+    height = TOP + row * len(positions) + BOTTOM
+    return _Layout(shown, drawn, poses, heads, scale, edges, stands, row, below, height)
 
-    svg = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height:.0f}" width="{WIDTH}" '
-        f'height="{height:.0f}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">',
-        f"<title>{figure.text(title or 'Stick figures over time')}</title>",
-        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{height - 1:.0f}" rx="10" fill="{PAPER}" '
-        f'stroke="{LINE}"/>',
-    ]
+
+def _frame(title: str, layout: _Layout) -> Iterator[str]:
+    """The paper, and what stands above the rows."""
+    height = f"{layout.height:.0f}"
+    yield (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {height}" width="{WIDTH}" '
+        f'height="{height}" role="img" font-family="{figure.text(figure.FONT)}" font-size="13">'
+    )
+    yield f"<title>{figure.text(title or 'Stick figures over time')}</title>"
+    yield (
+        f'<rect x=".5" y=".5" width="{WIDTH - 1}" height="{layout.height - 1:.0f}" rx="10" fill="{PAPER}" '
+        f'stroke="{LINE}"/>'
+    )
     if title:
-        svg.append(
+        yield (
             f'<text x="{LEFT}" y="34" font-size="18" font-weight="600" fill="{INK}">'
             f"{figure.text(title)}</text>"
         )
-
-    sided = ", left limbs dark, right limbs light" if any(drawn.sides) else ""
-    svg.append(
+    sided = ", left limbs dark, right limbs light" if any(layout.drawn.sides) else ""
+    yield (
         f'<text x="{WIDTH - RIGHT}" y="33" text-anchor="end" font-size="12" fill="{FAINT}">'
         f"gray: observed{sided}</text>"
     )
 
-    bottom = height - BOTTOM
-    for gap_start, gap_stop in figure.merged(inside):
-        within = [i for i, f in enumerate(shown) if gap_start <= f < gap_stop]
-        if not within:
-            continue
-        x, wide_px = edges[within[0]], edges[within[-1] + 1] - edges[within[0]]
-        svg.append(
-            f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide_px:.1f}" '
-            f'height="{bottom - TOP + 22:.1f}" '
-            f'rx="6" fill="{SHADE}"/>'
-        )
-        length = gap_stop - gap_start
-        label = f"gap {gap_start}:{gap_stop}, {length} frame{'s' * (length != 1)}, {_seconds(length / fps)}"
-        label = label if wide_px > 190 else f"gap {gap_start}:{gap_stop}" if wide_px > 90 else "gap"
-        svg.append(
-            f'<text x="{x + wide_px / 2:.1f}" y="{TOP - 6}" text-anchor="middle" font-size="12" '
-            f'fill="#8a5a00">{label}</text>'
-        )
 
-    for r, take in enumerate(takes):
-        ground = TOP + row * (r + 1) - below - 8
-        label_y = TOP + row * r + 20
-        svg.append(f'<g class="take"><title>{figure.text(take.name)}</title>')
-        svg.append(
-            f'<line x1="{LEFT}" y1="{ground:.1f}" x2="{WIDTH - RIGHT}" y2="{ground:.1f}" stroke="{LINE}" '
-            'stroke-width="1.5"/>'
-        )
-        for i in range(len(shown)):
-            x = stands[i] + poses[r, i, 0, 0] * scale
-            svg.append(
-                f'<ellipse cx="{x:.1f}" cy="{ground:.1f}" rx="{0.24 * scale:.1f}" ry="{0.045 * scale:.1f}" '
-                'fill="#000000" fill-opacity=".09"/>'
-            )
-        for i, frame in enumerate(shown):
-            tint = figure.tinted(missing, drawn.parents, frame)
-            in_gap, gray = _shades(take.color, drawn), _shades(OBSERVED, drawn)
-            colors = [a if t else b for a, b, t in zip(in_gap, gray, tint)]
-            place = np.array([scale, -scale, scale])
-            offset = np.array([stands[i], ground, 0.0])
-            points = poses[r, i] * place + offset
-            head = None if heads is None else heads[r, i] * place + offset
-            kind = "filled" if tint.any() else "observed"
-            svg.append(
-                f'<g class="figure {kind}" data-frame="{frame}" fill="none" stroke-linecap="round" '
-                f'stroke-linejoin="round">{_figure(points, head, drawn, colors, scale)}</g>'
-            )
-        svg.append(
-            f'<circle cx="{LEFT + 6}" cy="{label_y - 4.5:.1f}" r="5" fill="{take.color}"/>'
-            f'<text x="{LEFT + 18}" y="{label_y:.1f}" font-weight="600" fill="{INK}" stroke="{PAPER}" '
-            f'stroke-width="3" paint-order="stroke">{figure.text(take.name)}</text></g>'
-        )
+def _gap(start: int, stop: int, layout: _Layout, fps: float) -> Iterator[str]:
+    """The shade behind the figures of a gap, and what it says."""
+    within = [i for i, frame in enumerate(layout.shown) if start <= frame < stop]
+    if not within:
+        return
+    x, wide = layout.edges[within[0]], layout.edges[within[-1] + 1] - layout.edges[within[0]]
+    yield (
+        f'<rect class="gap" x="{x:.1f}" y="{TOP - 22}" width="{wide:.1f}" '
+        f'height="{layout.bottom - TOP + 22:.1f}" rx="6" fill="{SHADE}"/>'
+    )
+    length = stop - start
+    label = f"gap {start}:{stop}, {length} frame{'s' * (length != 1)}, {_seconds(length / fps)}"
+    label = label if wide > 190 else f"gap {start}:{stop}" if wide > 90 else "gap"
+    yield (
+        f'<text x="{x + wide / 2:.1f}" y="{TOP - 6}" text-anchor="middle" font-size="12" '
+        f'fill="#8a5a00">{label}</text>'
+    )
 
-    for i, frame in enumerate(shown):
-        svg.append(
-            f'<line x1="{center[i]:.1f}" y1="{bottom + 2:.1f}" x2="{center[i]:.1f}" y2="{bottom + 8:.1f}" '
+
+def _row(row: int, take: Take, layout: _Layout, missing: list[Span]) -> Iterator[str]:
+    """A take: its floor, its figures with their shadows, and its name over them."""
+    scale, drawn = layout.scale, layout.drawn
+    ground = TOP + layout.row * (row + 1) - layout.below - 8
+    label_y = TOP + layout.row * row + 20
+    yield f'<g class="take"><title>{figure.text(take.name)}</title>'
+    yield (
+        f'<line x1="{LEFT}" y1="{ground:.1f}" x2="{WIDTH - RIGHT}" y2="{ground:.1f}" stroke="{LINE}" '
+        'stroke-width="1.5"/>'
+    )
+    for x in layout.stands + layout.poses[row, :, 0, 0] * scale:
+        yield (
+            f'<ellipse cx="{x:.1f}" cy="{ground:.1f}" rx="{0.24 * scale:.1f}" ry="{0.045 * scale:.1f}" '
+            'fill="#000000" fill-opacity=".09"/>'
+        )
+    in_gap, gray = _shades(take.color, drawn), _shades(OBSERVED, drawn)
+    place = np.array([scale, -scale, scale])
+    for i, frame in enumerate(layout.shown):
+        tint = figure.tinted(missing, drawn.parents, frame)
+        colors = [a if t else b for a, b, t in zip(in_gap, gray, tint)]
+        offset = np.array([layout.stands[i], ground, 0.0])
+        points = layout.poses[row, i] * place + offset
+        head = None if layout.heads is None else layout.heads[row, i] * place + offset
+        kind = "filled" if tint.any() else "observed"
+        yield (
+            f'<g class="figure {kind}" data-frame="{frame}" fill="none" stroke-linecap="round" '
+            f'stroke-linejoin="round">{_figure(points, head, drawn, colors, scale)}</g>'
+        )
+    yield (
+        f'<circle cx="{LEFT + 6}" cy="{label_y - 4.5:.1f}" r="5" fill="{take.color}"/>'
+        f'<text x="{LEFT + 18}" y="{label_y:.1f}" font-weight="600" fill="{INK}" stroke="{PAPER}" '
+        f'stroke-width="3" paint-order="stroke">{figure.text(take.name)}</text></g>'
+    )
+
+
+def _times(layout: _Layout, fps: float) -> Iterator[str]:
+    """The frames and seconds under the rows."""
+    bottom = layout.bottom
+    for frame, x in zip(layout.shown, (layout.edges[:-1] + layout.edges[1:]) / 2):
+        yield (
+            f'<line x1="{x:.1f}" y1="{bottom + 2:.1f}" x2="{x:.1f}" y2="{bottom + 8:.1f}" '
             f'stroke="{FAINT}"/>'
-            f'<text x="{center[i]:.1f}" y="{bottom + 24:.1f}" text-anchor="middle" '
-            f'fill="{INK}">{frame}</text>'
-            f'<text x="{center[i]:.1f}" y="{bottom + 40:.1f}" text-anchor="middle" font-size="11" '
+            f'<text x="{x:.1f}" y="{bottom + 24:.1f}" text-anchor="middle" fill="{INK}">{frame}</text>'
+            f'<text x="{x:.1f}" y="{bottom + 40:.1f}" text-anchor="middle" font-size="11" '
             f'fill="{FAINT}">{_seconds(frame / fps)}</text>'
         )
-    svg.append("</svg>\n")
-    result = "\n".join(svg)
-    if path is not None:
-        Path(path).write_text(result, encoding="utf-8")
-    return result
+
+
+def _figure(points: np.ndarray, head: np.ndarray | None, drawn: Body, colors: list[str], scale: float) -> str:
+    """SVG of one pose: points (J, 3) in pixels and depth (towards the viewer), far bones first."""
+    parts: list[tuple[float, str, str]] = []
+    for joint, parent in enumerate(drawn.parents):
+        if parent < 0:
+            if joint not in drawn.parents:
+                x, y, depth = points[joint]
+                dot = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3" fill="{colors[joint]}"/>'
+                parts.append((depth, "", dot))
+            continue
+        (x1, y1, d1), (x2, y2, d2) = points[parent], points[joint]
+        style = f'stroke="{colors[joint]}" stroke-width="{max(drawn.thickness[joint] * scale, 1.2):.1f}"'
+        parts.append(((d1 + d2) / 2, style, f"M{x1:.1f} {y1:.1f}L{x2:.1f} {y2:.1f}"))
+    if head is not None:
+        x, y, depth = head
+        radius = drawn.head_radius * scale
+        circle = f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{radius:.1f}" fill="{colors[drawn.head]}"/>'
+        parts.append((depth, "", circle))
+    parts.sort(key=lambda part: part[0])
+    out, run, open_style = [], "", ""
+    for _, style, shape in [*parts, (0.0, "", "")]:
+        if style != open_style and run:
+            out.append(f'<path {open_style} d="{run}"/>')
+            run = ""
+        if style:
+            run += shape
+        else:
+            out.append(shape)
+        open_style = style
+    return "".join(out)
+
+
+def _shades(color: str, drawn: Body) -> list[str]:
+    """A color a bone: left limbs darker, right ones lighter."""
+    tones = {-1: figure.mix(color, "#000000", 0.28), 0: color, 1: figure.mix(color, "#ffffff", 0.38)}
+    return [tones[side] for side in drawn.sides]
