@@ -145,6 +145,8 @@ def test_models(run):
         assert card["name"] in done.out
         assert run("models", card["name"], "--json").json == card
         assert card["licence"] in run("models", card["name"]).out
+        assert Path(card["file"]).suffix == ".onnx"
+        assert Path(card["file"]).is_file()
     missing = run("models", "gpt")
     assert missing.code == 2
     assert "unknown model: gpt" in missing.err

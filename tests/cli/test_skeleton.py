@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.skeletons import rigs
 
@@ -53,6 +54,12 @@ def test_json_for_programs(run, rig):
     assert found["zero_pose"] == "none"
     assert found["t_pose_from"] == "motion"
     assert found["missing"] == []
+    assert {*found["t_pose"]} == {*found["mapping"].values()}
+    np.testing.assert_allclose(np.linalg.norm([*found["t_pose"].values()], axis=1), 1, atol=1e-5)
+    assert found["parents"]["LeftFoot"] == "LeftLeg"
+    shin = np.array(found["bones"]["LeftFoot"]) / np.linalg.norm(found["bones"]["LeftFoot"])
+    assert shin[1] < -0.99, "legs hang straight down in a T-pose"
+    assert found["scale"] * found["leg"] == pytest.approx(0.8587, abs=1e-3)
 
 
 def test_a_saved_map_is_corrected_and_obeyed(run, rig, tmp_path):

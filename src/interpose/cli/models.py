@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from interpose.cli.console import say, say_json, say_table
+
+if TYPE_CHECKING:
+    from interpose.methods.weights import Card
 
 METHODS = {
     "auto": "what measured best: base, for gaps of a tenth of a second and less the spline",
@@ -45,16 +48,16 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
             say(f"{name}: {what}\nIt has no trained weights, and so no card.")
         return
     if name is not None:
-        card = weights.card(name).to_dict()
+        said = _said(weights.card(name))
         if json:
-            say_json(card)
+            say_json(said)
         else:
-            say("\n".join(_lines(card)))
+            say("\n".join(_lines(said)))
         return
     cards = weights.cards()
     if json:
         methods = [{"name": one, "description": METHODS.get(one, "from another package")} for one in names]
-        say_json({"methods": methods, "models": [card.to_dict() for card in cards]})
+        say_json({"methods": methods, "models": [_said(card) for card in cards]})
         return
     say_table(("method", "what it does"), [(one, METHODS.get(one, "from another package")) for one in names])
     say()
@@ -80,6 +83,12 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
     say(f"interpose models {cards[0].name} prints the whole card.")
 
 
+def _said(card: Card) -> dict[str, Any]:
+    """A card, and where its graph lies, for other programs to run (docs/networks.md)."""
+    said = card.to_dict()
+    return {"name": said.pop("name"), "file": str(card.onnx), **said}
+
+
 def _lines(value: Any, indent: str = "") -> list[str]:
     """A card as indented text."""
     lines = []
@@ -95,9 +104,11 @@ def _lines(value: Any, indent: str = "") -> list[str]:
         elif isinstance(item, list) and len(item) > 24 and not isinstance(item[0], str):
             lines.append(f"{indent}{title}: {len(item)} numbers, see --json")
         elif isinstance(item, list):
-            lines.append(f"{indent}{title}: {', '.join(str(one) for one in item if one != '')}")
+            lines.append(f"{indent}{title}: {', '.join(_short(one) for one in item if one != '')}")
         elif item not in ({}, "", None):
-            lines.append(
-                f"{indent}{title}: {item:.4g}" if isinstance(item, float) else f"{indent}{title}: {item}"
-            )
+            lines.append(f"{indent}{title}: {_short(item)}")
     return lines
+
+
+def _short(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

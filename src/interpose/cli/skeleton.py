@@ -10,6 +10,8 @@ from interpose.cli.reading import Reading, describe, details
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from interpose.clip import Clip
     from interpose.skeletons.humanoid import Humanoid
 
@@ -126,7 +128,26 @@ def _details(body: Humanoid) -> dict[str, Any]:
         "leg": mapping.leg_length if mapping.usable else None,
         "zero_pose": rest.pose if rest else None,
         "t_pose_from": rest.how if rest else None,
+        **(_as_canonical(body) if rest else {}),
     }
+
+
+def _as_canonical(body: Humanoid) -> dict[str, Any]:
+    """What other programs need to bring motion to the canonical body and back (docs/networks.md)."""
+    from interpose.skeletons import JOINTS, PARENTS
+
+    rows, joints = body.mapping.mapped
+    names = body.mapping.skeleton.names
+    return {
+        "parents": {JOINTS[row]: JOINTS[parent] for row, parent in enumerate(PARENTS) if parent >= 0},
+        "t_pose": {names[joint]: _rounded(body.rest.rotation[row]) for row, joint in zip(rows, joints)},
+        "bones": {name: _rounded(bone) for name, bone in zip(JOINTS, body.bones)},
+        "scale": float(body.scale),
+    }
+
+
+def _rounded(values: np.ndarray) -> list[float]:
+    return [round(float(value), 6) for value in values]
 
 
 def _places(clip: Clip, frame: int) -> dict[str, list[float]]:
