@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -90,6 +92,36 @@ def test_toes_go_no_lower_than_toes_are_known_to(lying):
     assert heights[toe] - heights.min() == pytest.approx(0.08, abs=0.01)
     deep, joints = floor.depth(sunk(lying, 0.3), Observation.from_gaps(lying, [GAP]))
     assert deep[:, joints.index(toe)].max() == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize(("length", "held"), [(0.17, False), (0.6, True)])
+def test_fingers_stay_above_the_floor_with_the_hand_and_what_a_hand_holds_does_as_it_likes(
+    lying, length, held
+):
+    skeleton = lying.skeleton
+    hand, finger = skeleton.index("LeftHand"), skeleton.index("LeftHandIndex1")
+    bones = skeleton.rest_translation.copy()
+    bones[finger] *= length / np.linalg.norm(bones[finger])
+    lying = replace(lying, skeleton=replace(skeleton, rest_translation=bones), source=None)
+    # In the middle of the gap the hand bends down, and its finger into the floor.
+    turned, placed = lying.kinematics()
+    down = rotations.between(placed[0, finger] - placed[0, hand], np.array([0.0, -1.0, 0.0]))
+    share = np.zeros(len(lying))
+    share[GAP.start : GAP.stop] = np.sin(np.linspace(0, np.pi, len(GAP))) ** 2
+    rotation, above = lying.rotation.copy(), turned[:, skeleton.parents[hand]]
+    bent = rotations.multiply(rotations.slerp(rotations.identity(), down, share), turned[:, hand])
+    rotation[:, hand] = rotations.multiply(rotations.conjugate(above), bent)
+    said, seen = lying.with_motion(rotation, lying.translation), Observation.from_gaps(lying, [GAP])
+    assert placed[..., 1].min() - said.positions()[:, finger, 1].min() > 0.06
+    done = floor.lifted(said, seen, (GAP.start, GAP.stop))
+    if held:
+        assert done is said
+        return
+    after = done.positions()
+    assert placed[..., 1].min() - after[:, finger, 1].min() < 0.03
+    assert np.linalg.norm(after[:, hand] - said.positions()[:, hand], axis=-1).max() < 0.12
+    notes = complete(lying, seen, Said(said)).report.gaps[0].notes
+    assert not any("under the floor" in note for note in notes)
 
 
 def test_where_the_floor_is_and_which_way_a_body_faces_makes_no_difference(lying):

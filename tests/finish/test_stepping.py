@@ -70,6 +70,30 @@ def test_a_large_turn_is_an_even_one(standing):
     assert np.abs(np.diff(heading)).max() * 30 < 1.6 * 175 / 2
 
 
+@pytest.mark.parametrize(("last", "goes_on"), [(360, True), (120, False)])
+def test_a_body_that_turns_on_goes_through_a_key_and_one_that_turns_back_rests_there(standing, last, goes_on):
+    """Keys a second apart, turned by 0, 120, 240 and as far again, or back: each gap is led by itself."""
+    parts = [keys(standing, 30, degrees)[0].slice(30, 31) for degrees in (0, 120, 240, last)]
+    held = np.repeat([0, 1, 2, 3], [30, 30, 30, 1])
+    clip = standing.with_motion(
+        *(
+            np.concatenate([getattr(part, name) for part in parts])[held]
+            for name in ("rotation", "translation")
+        )
+    )
+    known = Observation.from_gaps(clip, [Gap(1, 30), Gap(31, 60), Gap(61, 90)])
+    done = complete(clip, known, Linear())
+    assert all(guarantees.STEPS in gap.notes for gap in done.report.gaps)
+    legs, placed = feet.legs(clip.skeleton), done.clip.positions()
+    across = placed[:, legs[0].thigh] - placed[:, legs[1].thigh]
+    heading = np.degrees(np.unwrap(np.arctan2(-across[:, 2], across[:, 0])))
+    rate = np.diff(heading) * 30
+    assert rate[:60].min() > -1, "never back"
+    assert min(rate[29], rate[30]) > 100, "120 degrees a second in the mean"
+    assert (min(rate[59], rate[60]) > 100) == goes_on
+    assert goes_on or max(abs(rate[59]), abs(rate[60])) < 20
+
+
 def test_turned_and_moved_keys_give_the_same_steps(standing):
     clip, known = keys(standing, 30, 90)
     reference = filled(clip, known)[0].positions()

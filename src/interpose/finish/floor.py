@@ -14,7 +14,7 @@ from interpose.finish.solve import refine
 from interpose.finish.windows import envelope, rounded, spread
 from interpose.methods.bodies import no_humanoid
 from interpose.observation import Observation
-from interpose.skeletons import find_mapping
+from interpose.skeletons import Mapping, find_mapping
 from interpose.skeletons.carrier import hips_of
 
 # Metres that a joint may be lower than the lowest one that is known (rounded off over half of it):
@@ -30,6 +30,8 @@ SHARES, FEET = (1e-1, 1e-2), 10.0
 SEEN, LOW, ABOUT = 1.0, 0.5, 0.2
 # How high hips are, in legs, of a body that stands or crouches on the floor.
 UPRIGHT = (0.75, 1.2)
+# Metres from a hand or the head within which what hangs from it is part of the body, as fingers are.
+HAND = 0.25
 # Metres that are no lift.
 NOTHING = 1e-4
 
@@ -39,12 +41,13 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
 
     That is the lowest observed joint of poses of which a foot is; for ankles, and for toes, the lowest one of
     these, where that is about as low: knees on which a body kneels may lie deeper than feet ever do. The
-    joints are those of the humanoid; what is observed is 0 deep, and so are feet under hips that stand, where
-    little is known: a single pose may have them in the air. Where no foot is observed the floor is at height
-    0, as in most files, if hips are where those of a body are that stands on it; else nothing is deep.
+    joints are those of the humanoid, and what its hands and head end in; what is observed is 0 deep, and so
+    are feet under hips that stand, where little is known: a single pose may have them in the air. Where no
+    foot is observed the floor is at height 0, as in most files, if hips are where those of a body are that
+    stands on it; else nothing is deep.
     """
     mapping, size = find_mapping(clip.skeleton), feet.size(clip.skeleton)
-    joints, ends = list(mapping.mapped[1]), feet.ends(clip.skeleton)
+    joints, ends = [*mapping.mapped[1], *_beyond(mapping)], feet.ends(clip.skeleton)
     heights, observed = clip.positions()[..., 1], known.positions(clip.skeleton)
     tells = observed[:, ends].any(axis=1)
     if no_humanoid(mapping) or not (tells.any() or _upright(clip, observed, mapping.leg_length)):
@@ -62,6 +65,19 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
         stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
         below[:, ends] *= ~stands[:, None]
     return below[:, joints], joints
+
+
+def _beyond(mapping: Mapping) -> list[int]:
+    """The joints that hang from hands and head, none further from there than a hand is long: fingers, say."""
+    skeleton, found = mapping.skeleton, []
+    bones = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
+    for end in filter(None, (mapping["LeftHand"], mapping["RightHand"], mapping["Head"])):
+        away = {end: 0.0}
+        for joint in np.flatnonzero(skeleton.below[:, end]).tolist():
+            if (parent := skeleton.parents[joint]) in away and joint not in mapping.mapped[1]:
+                away[joint] = away[parent] + float(bones[joint])
+        found += [joint for joint in away if joint != end and away[joint] < HAND * feet.size(skeleton)]
+    return found
 
 
 def _upright(clip: Clip, observed: np.ndarray, leg: float) -> bool:
@@ -86,7 +102,10 @@ def lifted(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     fade = np.prod(envelope(inside & ~known.frames, over), axis=0)
     lift = np.array([spread(rounded(column - SINK, SINK / 2), over) for column in deep.T / size]).T
     lift = size * lift * fade[:, None]
-    return higher(clip, known, joints, lift)
+    # What hangs from hands need not hold still.
+    canonical = {*find_mapping(clip.skeleton).mapped[1]}
+    asked = [i for i, joint in enumerate(joints) if joint in canonical or lift[:, i].max() > NOTHING]
+    return higher(clip, known, [joints[i] for i in asked], lift[:, asked])
 
 
 def higher(clip: Clip, known: Observation, joints: list[int], lift: np.ndarray) -> Clip:

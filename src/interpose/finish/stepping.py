@@ -98,7 +98,7 @@ def stepped(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip | Non
         return None
     angles, dip = np.zeros(stop - start), np.zeros(stop - start)
     if abs(turn.angle) > TURN:
-        angles = _evenly(clip, turn.angle, span)
+        angles = _evenly(clip, known, turn.angle, span)
     done = _led(clip, angles, dip, goal, span)
     # Hips sink a little where a leg, which may be straight in both keys, is too short for its step.
     short = done.positions()[start:stop, [leg.ankle for leg in legs], 1] - goal[..., 0, 1]
@@ -196,12 +196,33 @@ def _half_way(turn: Turn, clip: Clip, span: tuple[int, int]) -> np.ndarray:
     return np.asarray((left < to_go).sum(axis=0), float)
 
 
-def _evenly(clip: Clip, angle: float, span: tuple[int, int]) -> np.ndarray:
-    """(n,) radians by which the body is to turn in frames of a span to turn evenly, by `angle` in all."""
+def _evenly(clip: Clip, known: Observation, angle: float, span: tuple[int, int]) -> np.ndarray:
+    """(n,) radians by which the body is to turn in frames of a span to turn evenly, by `angle` in all.
+
+    It comes to rest at a key, unless it turns on beyond it: then it goes through it at the harmonic mean of
+    both rates, so that it never turns back (Fritsch and Butland 1984).
+    """
     start, stop = span
     heading = _heading(clip.slice(start - 1, stop + 1).positions(), clip)
-    share = np.linspace(0, 1, stop - start + 2)
-    return (heading[0] + angle * share * share * (3 - 2 * share) - heading)[1:-1]
+    frames = stop - start + 1
+    share, rate = np.linspace(0, 1, frames + 1), angle / frames
+    leave, meet = (
+        frames * 2 * rate * on / (rate + on) if rate * on > 0 else 0.0
+        for on in (_rate(clip, known, start - 1, -1), _rate(clip, known, stop, 1))
+    )
+    way = angle * share**2 * (3 - 2 * share) + share * (1 - share) * (leave * (1 - share) - meet * share)
+    return (heading[0] + way - heading)[1:-1]
+
+
+def _rate(clip: Clip, known: Observation, key: int, ahead: int) -> float:
+    """Radians a frame by which the body is to turn from a lone key to the next known frame behind it, or
+    `ahead` (1, or else -1); 0 where there is none."""
+    others = np.flatnonzero(known.frames[key + 1 :] if ahead > 0 else known.frames[:key][::-1])
+    if not others.size or not others[0]:
+        return 0.0
+    far = int(others[0]) + 1
+    first = min(key, key + ahead * far)
+    return _angle(clip, (first + 1, first + far)) / far
 
 
 def _led(clip: Clip, angles: np.ndarray, dip: np.ndarray, goal: np.ndarray, span: tuple[int, int]) -> Clip:

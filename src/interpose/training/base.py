@@ -26,7 +26,7 @@ from interpose.models.base import CONFIGS, COUNT, Answer, Base, BaseConfig, Moti
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
-from interpose.training.device import pick_device, processes, send
+from interpose.training.device import mixed, pick_device, processes, send
 from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
@@ -388,7 +388,7 @@ def train_base(
         placed = drawn.positions()
         start = model.start(given.local, given.root, known, drawn.bones)
         seen = model.features(start, known, placed, pins)
-        with torch.autocast(device.type, torch.bfloat16):
+        with mixed(device):
             said = model.encoder(seen, drawn.label, drawn.bones)
         answer = model.answer(start, said, given.local, known)
         weight = relief(start.placed, placed, known) ** -settings.relative

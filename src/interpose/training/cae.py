@@ -37,7 +37,7 @@ from interpose.observation.corruption import gap_mask, gaussian_noise, joints_ma
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
-from interpose.training.device import pick_device, processes, send
+from interpose.training.device import mixed, pick_device, processes, send
 from interpose.training.loop import SHARE, SOME, Settings, Trainer, from_weights, restore, taught
 from interpose.training.windows import SHORTEST, Windows
 
@@ -238,7 +238,7 @@ def train_cae(
             chosen, *disturbance = disturb(rng, settings, batch)
             observed[chosen] = True
         image = to_image(positions, send(observed, device))
-        with torch.autocast(device.type, torch.bfloat16):
+        with mixed(device):
             if settings.noise:
                 noise, kept = (send(one, device) for one in disturbance)
                 answer = predict_disturbed(model, image, noise, kept)

@@ -17,7 +17,7 @@ from interpose.geometry import rotations
 from interpose.methods.weights import Card
 from interpose.models.cmib import Cmib, CmibConfig, decode
 from interpose.training.budget import Budget
-from interpose.training.device import pick_device, processes, send
+from interpose.training.device import mixed, pick_device, processes, send
 from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of, new_path
@@ -109,7 +109,7 @@ class Losses:
         # The truth in the frame of the keys: its origin is that of the ends, which are keys, too.
         truth, _, _ = self.model.prepare(positions, batch.rotation, torch.ones_like(keys))
         true, true_held = self.model.split(truth)
-        with torch.autocast(frames.device.type, torch.bfloat16):
+        with mixed(frames.device):
             token, out = self.model.encoder(frames, keys, batch.label)
         label, (said, held) = self.model.encoder.label(batch.label), self.model.split(out.float())
         if held.shape[-1] == 4:  # both quaternions of a rotation are right: the one near interpolation's

@@ -60,7 +60,7 @@ def _forward(module: nn.ConvTranspose2d, x: Tensor) -> Tensor:
 
 
 def quicken(model: nn.Module) -> None:
-    """Send the strided deconvolutions of a model through the fast path; for training on a CPU in bfloat16."""
+    """Send the strided deconvolutions of a model through the fast path; for training on a CPU."""
     for module in model.modules():
         if isinstance(module, nn.ConvTranspose2d) and module.stride != (1, 1):
             # A method, and no function that knows the module: in a copy of the model it is the copy's.

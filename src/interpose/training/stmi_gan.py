@@ -48,7 +48,7 @@ from interpose.observation.corruption import LIMBS, gap_mask
 from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
-from interpose.training.device import pick_device, processes, send
+from interpose.training.device import mixed, pick_device, processes, send
 from interpose.training.loop import SHARE, SOME, Opponent, Settings, Trainer, restore, taught
 from interpose.training.windows import Windows
 
@@ -201,7 +201,7 @@ class Game:
         positions = draw(rng, self.windows, self.settings, self.batch)
         observed = send(corrupt(rng, self.settings, self.batch), positions.device)
         truth = Frame.of(positions, observed).align(positions)
-        with torch.autocast(truth.device.type, torch.bfloat16):
+        with mixed(truth.device):
             made = self.generator.aligned(truth, observed, noise(self.generator, len(truth), truth.device))
         rows, together = self.settings.network.rows, self.settings.network.together
         # What a curve leaves out would tell the two apart at once, and the network could only answer it by
@@ -221,7 +221,7 @@ class Game:
         self.turn += 1
         judge, std = self.discriminator, self.generator.std
         truth = (self.motions.real / std).requires_grad_(penalised)
-        with torch.autocast(truth.device.type, torch.bfloat16):
+        with mixed(truth.device):
             fake = judge(judge.seen(self.motions.made.detach())).float()
             real = judge(judge.seen(truth * std)).float()
         loss = functional.softplus(fake).mean() + functional.softplus(-real).mean()
@@ -239,7 +239,7 @@ class Game:
         motions = self.motions if asked.looks and self.motions else self.play(rng)
         loss = self.told(motions)
         if asked.looks:
-            with torch.autocast(motions.made.device.type, torch.bfloat16):
+            with mixed(motions.made.device):
                 fake = self.discriminator(self.discriminator.seen(motions.made)).float()
             loss = loss + asked.adversarial * functional.softplus(-fake).mean()
         return loss
