@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -354,3 +356,20 @@ def test_feet_that_slide_fast_are_told_where_nothing_tells_what_is_usual(walk, s
     known = gaps_of(clip, (10, 36))
     said = [note for note in notes.skids(slide, clip, known, Gap(10, 36), 0) if "cm/s" in note]
     assert said == [f"flagged: feet slide at {slide:.0f} cm/s"] * (slide > 30)
+
+
+@pytest.mark.parametrize("size", [0.4, 1.0, 3.0])
+def test_what_is_said_of_slides_and_errors_does_not_depend_on_how_large_a_body_is(walk, size):
+    skeleton = replace(walk.skeleton, rest_translation=walk.skeleton.rest_translation * size)
+    clip = replace(walk, skeleton=skeleton, translation=walk.translation * size, source=None)
+    known, gap = gaps_of(clip, (75, 120)), Gap(75, 120)
+    leg = feet.size(clip.skeleton)
+
+    def told(slide: float, risk: float) -> int:
+        expected = np.full(len(gap), risk * leg)
+        return len(notes.skids(slide * leg, clip, known, gap, 0)) + len(
+            notes.doubtful(expected, clip, gap, 0)
+        )
+
+    assert told(60.0, 0.16) == 2
+    assert told(10.0, 0.14) == 0

@@ -236,11 +236,13 @@ def measure_all(clip: Clip, known: Observation, ranges: list[tuple[int, int]]) -
     joints = pairs(clip.skeleton)
     if not joints.size:
         return []
-    feet, grown = clip.positions()[:, joints], size(clip.skeleton)
-    floor = grown * local_floor(feet / grown, known.positions(clip.skeleton)[:, joints], clip.fps)
+    # Seen as those of a body of usual size.
+    grown = size(clip.skeleton)
+    feet = clip.positions()[:, joints] / grown
+    floor = local_floor(feet, known.positions(clip.skeleton)[:, joints], clip.fps)
     parts = [slice(max(start - 1, 0), stop + 1) for start, stop in ranges]
-    slides = [measures.foot_slide(feet[part], clip.fps, floor[part]) for part in parts]
-    return list(zip(slides, [measures.foot_travel(feet[part]) for part in parts]))
+    slides = [grown * measures.foot_slide(feet[part], clip.fps, floor[part]) for part in parts]
+    return list(zip(slides, [grown * measures.foot_travel(feet[part]) for part in parts]))
 
 
 def drifts(

@@ -78,7 +78,7 @@ def gap_report(
             *notes.hasty(finished, known, gap, first),
             *notes.whirling(finished, known, gap, first),
             *([] if bounds else notes.wild(finished, known, gap, first)),
-            *notes.doubtful(risk, gap, first, ahead),
+            *notes.doubtful(risk, finished, gap, first),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
             *notes.rests(never, span.method),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),

@@ -26,8 +26,8 @@ DULL = 0.33
 GLIDES, AIRBORNE = 0.25, 0.35
 # Metres a second, with the usual leg: who is slower walks.
 RUNS = 2.0
-# Metres that joints are expected to be off by in the mean from which a report says so: far more than in most
-# gaps of a second.
+# Metres, with the usual leg, that joints are expected to be off by in the mean from which a report says so:
+# far more than in most gaps of a second.
 DOUBT = 0.15
 # Seconds that should be known on either side of a gap for a network to fill it well. Errors of validation
 # performers are then within 6 % of those with .83 s, in gaps of .67, 1.33 and 2 s (bench context).
@@ -39,8 +39,9 @@ BESIDE = 0.1
 BACKWARDS, BACK, HURRIES, SLOW, EVEN = 0.7, 1.6, 2.2, 1.4, 0.1
 # Metres below the floor at which a foot, or another joint, is asked about.
 SUNK = 0.05
-# Feet that slide so many times as much as around a gap, and more than this (centimetres a second), are asked
-# about: of 120 pieces of validation performers' real motion 2.5 % do, and 2.5 % of fills, others than these.
+# Feet that slide so many times as much as around a gap, and more than this (centimetres a second, with the
+# usual leg), are asked about: of 120 pieces of validation performers' real motion 2.5 % do, and 2.5 % of
+# fills, others than these.
 SKIDS, SLIDES = 3.0, 15.0
 # Between lone keys, and where less than a second is known, feet that slide at so much alone are: half a turn
 # between two keys takes 21 cm/s in truth.
@@ -146,7 +147,8 @@ def skids(slide: float | None, finished: Clip, known: Observation, gap: Gap, fir
     whole = runs(seen.frames)
     slid = feet.measure_all(part, seen, [(a + 1, b - 1) for a, b in whole if b - a > near // 2])
     most = max((one for one, _ in slid), default=None)
-    if slide > max(SKIDS * (most or 0.0), SLIDES if most is not None else UNSEEN):
+    least = feet.size(finished.skeleton) * (SLIDES if most is not None else UNSEEN)
+    if slide > max(SKIDS * (most or 0.0), least):
         around = f", around the gap at {most:.0f} at most" if most is not None else ""
         said.append(f"flagged: feet slide at {slide:.0f} cm/s{around}")
     (way, joint, start, stop), *usual = feet.drifts(part, seen, [(gap.start - lo, gap.stop - lo), *whole])
@@ -245,14 +247,14 @@ def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) ->
     ]
 
 
-def doubtful(risk: np.ndarray | None, gap: Gap, first: int, ahead: bool) -> list[str]:
+def doubtful(risk: np.ndarray | None, finished: Clip, gap: Gap, first: int) -> list[str]:
     """A note where joints are expected to be far off: `risk` is metres by frame of the gap."""
-    if risk is None or risk.mean() <= DOUBT:
+    if risk is None or risk.mean() <= DOUBT * feet.size(finished.skeleton):
         return []
     off = f"{100 * risk.mean():.0f} cm"
     said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
-    # Whoever asks for what comes next has no key to give.
-    return [said if ahead else f"{said}. A key near frame {first + gap.start + int(risk.argmax())} helps"]
+    worst = first + gap.start + int(risk.argmax())
+    return [said + _helps(finished, gap, f". A key near frame {worst} helps")]
 
 
 def never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:
