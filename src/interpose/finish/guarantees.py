@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import anatomy, feet, floor, jumps, notes, pins, seams, stepping
+from interpose.finish import anatomy, falling, feet, floor, jumps, notes, pins, seams, stepping
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
 from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
@@ -149,6 +149,8 @@ class _Work:
                 self.mended[span.start] = places
         for span in chosen:
             self.unheld.update(slides(current, self.known, span, self.gaps))
+            if own and not layer:
+                _land(current, self.firm, span)
             if not layer and _step(current, self.firm, span):
                 self.stepped.add((span.start, own))
             elif not (own and layer and layer.stands):
@@ -265,6 +267,12 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: S
     raw = source.slice(lo, hi)
     if seams.difference(raw, base, seen, inner)[0] > seams.EXACT:
         write(current, merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
+
+
+def _land(current: Clip, known: Observation, span: Span) -> None:
+    """Let a body come down that is in the air where a span at an end of the clip begins."""
+    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
+    write(current, falling.landed(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
 
 
 def _lift(current: Clip, known: Observation, span: Span) -> None:
