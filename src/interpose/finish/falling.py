@@ -44,11 +44,9 @@ def landed(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         turned = clip.with_motion(clip.rotation[::-1], clip.translation[::-1])
         done = landed(turned, back, (len(clip) - stop, len(clip)))
         return clip if done is turned else clip.with_motion(done.rotation[::-1], done.translation[::-1])
-    legs = feet.legs(clip.skeleton)
-    if start < 2 or stop < len(clip) or not legs or not find_mapping(clip.skeleton).usable:
+    if start < 2 or stop < len(clip) or not feet.untold(clip, known, start, stop):
         return clip
-    moves = [place_of(clip), *(joint for leg in legs for joint in (leg.thigh, leg.knee, leg.ankle))]
-    if known.rotation[start:, moves].any() or known.positions(clip.skeleton)[start:].any():
+    if not feet.legs(clip.skeleton) or not find_mapping(clip.skeleton).usable:
         return clip
     grown, fps = feet.size(clip.skeleton), clip.fps
     placed = clip.positions() / grown

@@ -18,6 +18,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
 from interpose.skeletons import LEG_LENGTH, find_mapping
+from interpose.skeletons.carrier import place_of
 
 # A contact is slower than the first speed (metres a second) somewhere and nowhere faster than the second; it
 # is no higher above the floor than HIGH and lasts at least SHORT seconds. What moves further than STEP in it
@@ -109,6 +110,13 @@ def told(clip: Clip, known: Observation, start: int, stop: int) -> bool:
     there is nobody's but the clip's own."""
     joints = pairs(clip.skeleton)
     return bool(known.slice(start, stop).positions(clip.skeleton)[:, joints.ravel()].all())
+
+
+def untold(clip: Clip, known: Observation, start: int, stop: int) -> bool:
+    """Whether nothing is known of legs, nor of where the body is, in frames start to stop - 1."""
+    chains = [joint for leg in legs(clip.skeleton) for joint in (leg.thigh, leg.knee, leg.ankle)]
+    placed = known.slice(start, stop).positions(clip.skeleton)
+    return not (known.rotation[start:stop, [place_of(clip), *chains]].any() or placed.any())
 
 
 def local_floor(feet: np.ndarray, known: np.ndarray, fps: float) -> np.ndarray:

@@ -84,8 +84,7 @@ def stepped(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip | Non
     legs = feet.legs(clip.skeleton)
     if len(legs) != 2 or start < 1 or stop >= len(clip):
         return None
-    moves = [place_of(clip), *(joint for leg in legs for joint in (leg.thigh, leg.knee, leg.ankle))]
-    if known.rotation[start:stop, moves].any() or known.positions(clip.skeleton)[start:stop].any():
+    if not feet.untold(clip, known, start, stop):
         return None
     turn = _on_the_spot(clip, known, span)
     if turn is None:
