@@ -347,3 +347,23 @@ def test_what_a_batch_has_made_is_not_taken_for_more(run, takes):
         "b.bvh",
         "b.denoised.bvh",
     ]
+
+
+def test_what_a_folder_was_converted_to_is_told_as_json(run, take, tmp_path):
+    (tmp_path / "takes").mkdir()
+    take.rename(tmp_path / "takes" / "a.bvh")
+    (tmp_path / "takes" / "b.bvh").write_text("nothing")
+    done = run("convert", "takes", "half", "--fps", "15", "--drop-repeated", "--json")
+    assert done.code == 3
+    good, bad = done.json
+    assert good["input"] == str(Path("takes", "a.bvh"))
+    assert (good["frames"], good["code"], good["dropped"]) == (163, 0, 0)
+    made = load(good["wrote"]["file"])
+    assert (good["wrote"]["frames"], good["wrote"]["fps"]) == (len(made), 15) == (82, 15)
+    assert good["wrote"]["joints"] == len(made.skeleton)
+    assert bad["code"] == 3
+    assert {"error", "why", "fix"} <= set(bad)
+    again = run("convert", "takes", "half", "--fps", "15", "--skip-existing", "--json").json
+    assert again[0] == {"input": good["input"], "skipped": True, "code": 0}
+    alone = run("convert", good["input"], "a.npz", "--json").json
+    assert alone["wrote"] == {"file": "a.npz", "frames": 163, "fps": 30.0, "joints": good["joints"]}

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from cyclopts import Parameter
 
 from interpose.cli.batch import each
-from interpose.cli.console import names, say
-from interpose.cli.reading import Reading, describe
+from interpose.cli.console import names, say, say_json
+from interpose.cli.reading import Reading, describe, details
 from interpose.errors import NothingError, RequestError
 
 if TYPE_CHECKING:
@@ -28,6 +28,7 @@ def convert(
     fps: float | None = None,
     onto: Path | None = None,
     drop_repeated: bool = False,
+    json: bool = False,
     force: bool = False,
     skip_existing: bool = False,
     reading: Reading = Reading(),
@@ -55,6 +56,7 @@ def convert(
             as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
         drop_repeated: take out whole frames that are the one before, as `interpose scan` finds them, and
             spread the others over the time: 24 frames a second in a file of 30 move evenly.
+        json: print JSON for other programs.
         force: replace an existing file.
         skip_existing: of folders: leave out clips whose result is there already: a batch goes on where it
             stopped.
@@ -74,6 +76,7 @@ def convert(
         onto=onto,
         drop_repeated=drop_repeated,
         alone=alone,
+        json=json,
         force=force,
         skip_existing=skip_existing,
         reading=reading,
@@ -87,7 +90,7 @@ def _written(output: Path, to: str | None) -> Path:
 def _earlier(path: Path, options: dict[str, Any]) -> tuple[Path, dict[str, Any]] | None:
     """What was converted before: there is no report of it."""
     made = _written(options["output"], options["to"])
-    return (made, {}) if made.exists() else None
+    return (made, {"input": str(path)}) if made.exists() else None
 
 
 def _convert(
@@ -100,6 +103,7 @@ def _convert(
     onto: Path | None,
     drop_repeated: bool,
     alone: bool,
+    json: bool,
     force: bool,
     reading: Reading,
 ) -> None:
@@ -123,7 +127,7 @@ def _convert(
             "nobody records or plays that",
             f"Choose up to {FASTEST:g}.",
         )
-    made, said = clip, ""
+    made, said, repeated = clip, "", 0
     if drop_repeated:
         again = repeats(clip)
         if alone and not again.any():
@@ -134,24 +138,30 @@ def _convert(
             )
         if again.any():
             made = spread(clip, again)
-            said = f"; {again.sum()} were repeated, and what moved in steps moves evenly"
-    kept = ""
+            repeated = int(again.sum())
+            said = f"; {repeated} were repeated, and what moved in steps moves evenly"
+    kept = []
     if onto is not None:
         made = retarget(made, rig)
-        kept = _kept(clip, rig) if other_rig(clip, rig) else ""
+        kept = _kept(clip, rig) if other_rig(clip, rig) else []
     made = replace(resample(made, fps, smooth=True), source=made.source) if fps is not None else made
-    notes = save(replace(made, name=output.stem), output, force=force)
+    notes = [*kept, *save(replace(made, name=output.stem), output, force=force)]
+    if json:
+        written = {"file": str(output), "frames": len(made), "fps": made.fps, "joints": len(made.skeleton)}
+        more = {"dropped": repeated} if drop_repeated else {}
+        say_json({"input": str(file), **details(clip), "wrote": written, **more, "notes": notes})
+        return
     say("\n".join([*describe(file, clip), *(describe(onto, rig) if onto is not None else [])]))
-    for note in (*([kept] if kept else []), *notes):
+    for note in notes:
         say(f"note: {note}")
     say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps{said}")
 
 
-def _kept(clip: Clip, rig: Clip) -> str:
+def _kept(clip: Clip, rig: Clip) -> list[str]:
     """What the motion of another rig tells nothing of."""
     from interpose.finish.retargeting import common
 
     told = common(clip, rig)
     others = [name for name in rig.skeleton.names if name not in told]
     what = f"{len(others)} joint{'s keep their' if len(others) > 1 else ' keeps its'} mean pose in {rig.name}"
-    return f"{what}: {names(others)}" if others else ""
+    return [f"{what}: {names(others)}"] if others else []
