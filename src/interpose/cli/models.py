@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from interpose.methods.weights import Card
 
 METHODS = {
-    "auto": "what measured best: base, for gaps of a tenth of a second and less the spline",
+    "auto": "what measured best: base, and for gaps of a single frame the spline",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "kalman": "low-rank Kalman smoothing: joints that move together tell where a lost limb is",

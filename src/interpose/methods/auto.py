@@ -1,4 +1,4 @@
-"""Which method suits which gap, by measurement: short gaps to the spline, long ones to a network."""
+"""Which method suits which gap, by measurement: the shortest gaps to the spline, others to a network."""
 
 from __future__ import annotations
 
