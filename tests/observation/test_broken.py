@@ -38,6 +38,19 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("name", ["Hips", "LeftArm"])
+def test_half_a_turn_is_a_spike_though_quaternions_have_no_sign_behind_it(cmu_walk, name, axis, frames):
+    joint, rotation = cmu_walk.skeleton.index(name), cmu_walk.rotation.copy()
+    half = rotations.exp(np.pi * np.eye(3)[axis])
+    rotation[80 : 80 + frames, joint] = rotations.multiply(rotation[80 : 80 + frames, joint], half)
+    seen = broken(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert not seen.rotation[80 : 80 + frames, joint].any()
+    seen.rotation[80 : 80 + frames, joint] = True
+    assert seen.rotation.all()
+
+
 @pytest.mark.parametrize("joint", ["RightForeArm", "LeftForeArm", "Head"])
 def test_of_a_spike_that_rises_and_falls_the_first_and_last_frame_are_found(cmu_walk, joint):
     """Filters make such of one frame. Without their ends what is left leads from one to the other."""

@@ -396,3 +396,17 @@ def test_a_clip_in_which_nothing_ever_moves_is_said(cmu_walk):
         assert [(one.joints, one.start, one.stop) for one in found] == [(None, 0, len(cmu_walk))]
         assert "no joint turns" in found[0].note
         assert not to_gaps(found)
+
+
+def test_a_joint_that_never_moves_is_lost_where_the_other_side_does_for_more_than_a_spike(cmu_walk):
+    left, right = (cmu_walk.skeleton.index(f"{side}ForeArm") for side in ("Left", "Right"))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, left] = rotation[0, left]
+    found = scan(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert [(one.kind, one.joints, one.note) for one in found] == [
+        ("frozen", ("LeftForeArm",), "the other side moves")
+    ]
+    rotation[:, right] = rotation[0, right]
+    for frame in (80, 120):
+        rotation[frame, right] = rotations.multiply(rotation[0, right], rotations.about("X", np.array(1.0)))
+    assert not any(one.kind == "frozen" for one in scan(cmu_walk.with_motion(rotation, cmu_walk.translation)))

@@ -35,6 +35,7 @@ MANY = 5
 SPIKE, TIMES = 0.35, 10.0
 SPIKE_WAY, BENT = 0.1, 0.4
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
+NEAR = 0.7  # the product of two quaternions that are within a quarter turn
 # What rises to its height over frames is motion (toes that push off, at 30 fps): beside a spike there is less
 # than this share of it. Of 40 runs of Bandai-Namco 5 toes are taken for lost so, and 52 without it; of 498
 # spikes put into clips of all sets 487 are found instead of 495.
@@ -225,10 +226,20 @@ def _away(values: np.ndarray, far: float, longest: int) -> np.ndarray:
 def _jumps(values: np.ndarray) -> np.ndarray:
     """(F - 1, d) by what each step of values (F, d) differs from the median of the four around it; of
     quaternions twice that, in radians."""
-    steps = np.diff(rotations.continuous(values) * 2.0 if values.shape[1] == 4 else values, axis=0)
+    steps = np.diff(_continuous(values) * 2.0 if values.shape[1] == 4 else values, axis=0)
     padded = np.pad(steps, ((2, 2), (0, 0)), mode="edge")
     around = np.stack([padded[i : i + len(steps)] for i in (0, 1, 3, 4)])
     return np.asarray(steps - np.median(around, axis=0))
+
+
+def _continuous(values: np.ndarray) -> np.ndarray:
+    """Rotations (F, 4) with signs that go on, also behind a spike of half a turn, through which they are
+    anybody's guess: there they go on from before it."""
+    own = rotations.continuous(values).copy()
+    for run in range(1, AROUND + 1):
+        turned = (own[run + 1 :] * own[: -run - 1]).sum(axis=1) < -NEAR
+        own[run + 1 :] *= np.where(np.cumsum(turned) % 2, -1.0, 1.0)[:, None]
+    return own
 
 
 def _spikes(values: np.ndarray, far: float, second: int) -> tuple[np.ndarray, np.ndarray]:
@@ -236,7 +247,7 @@ def _spikes(values: np.ndarray, far: float, second: int) -> tuple[np.ndarray, np
 
     Source: Hampel's identifier; the scale is the median within a second on either side.
     """
-    own = rotations.continuous(values)
+    own = _continuous(values)
     middle = medians(own, AROUND, "edge")
     middle = rotations.normalize(middle)
     off = _apart(own, middle)

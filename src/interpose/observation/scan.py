@@ -26,8 +26,9 @@ from interpose.skeletons.carrier import hips_of, place_of, placed
 STILL = 1e-6
 # A joint that turns less than this in the whole clip (radians) has no data at all, like most fingers.
 LIFELESS = 1e-3
-# A joint whose like on the other side turns this much in the whole clip (radians) has data, too, or had.
-LIVELY = 1.0
+# A joint whose like on the other side turns this much in the whole clip (radians), and in this share of its
+# frames, has data, too, or had: a spike alone is none.
+LIVELY, OFTEN = 1.0, 0.1
 # A joint that stands still in more than this share of all steps has no data either: rest poses turn it.
 IDLE = 0.9
 # So many joints do not stop turning at once by themselves.
@@ -467,6 +468,7 @@ def _pace(clip: Clip, frame: int) -> float:
 def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
     """Joints of a humanoid that never move, while the same ones of the other side do: one finding."""
     total, mapping = np.nansum(turned, axis=0), find_mapping(clip.skeleton)
+    often = (turned > STILL).mean(axis=0) > OFTEN
     dead = [
         joint
         for joint, side in zip(mapping.joints, SIDES)
@@ -474,6 +476,7 @@ def _dead(clip: Clip, turned: np.ndarray) -> list[Finding]:
         and (other := mapping.joints[side]) is not None
         and total[joint] <= LIFELESS
         and total[other] > LIVELY
+        and often[other]
         and np.isfinite(turned[:, joint]).all()
     ]
     names = tuple(clip.skeleton.names[joint] for joint in sorted(dead))
