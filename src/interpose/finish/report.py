@@ -57,7 +57,8 @@ class GapReport:
         path: cm, by how much the hips miss points of the path that was asked for.
         pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
-        expected: cm that joints are expected to be off by in the mean, by a network that says so.
+        expected: cm that joints which are not known are expected to be off by, in the mean; of networks that
+            say so.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
     """
