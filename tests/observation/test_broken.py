@@ -11,9 +11,11 @@ from tests.skeletons.rigs import under_root
 from interpose import formats
 from interpose.evaluation.denoising import drop
 from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.observation import Observation
 from interpose.observation import broken as module
 from interpose.observation.broken import BLOCK, _smoother, broken, medians
+from interpose.observation.scan import stuck
 from interpose.skeletons.carrier import hips_of
 
 
@@ -253,3 +255,16 @@ def test_medians_of_long_takes_need_little_room():
     assert most < 10 * values.nbytes
     meet = slice(BLOCK - 20, BLOCK + 20)
     assert np.array_equal(whole[meet][3:-3], medians(values[meet], 3, "edge")[3:-3])
+
+
+def test_a_root_that_stands_still_is_right_but_for_its_spikes(cmu_walk):
+    clip = under_root(cmu_walk, goes=False)
+    root = clip.translated.index(clip.skeleton.roots[0])
+    places = clip.translation.copy()
+    spikes = [(28, 30), (84, 87), (145, 147)]
+    for start, stop in spikes:
+        places[start:stop, root] += [0.2, -0.1, 0.3]
+    spiked = clip.with_motion(clip.rotation, places)
+    lost = ~broken(spiked).translation[:, clip.skeleton.roots[0]]
+    assert [(start, stop) for start, stop in runs(lost)] == spikes
+    assert not stuck(spiked)

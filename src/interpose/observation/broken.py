@@ -187,6 +187,8 @@ def _snaps(values: np.ndarray, home: np.ndarray, longest: int) -> np.ndarray:
     away = np.flatnonzero(far > SAME)
     if not 4 <= len(away) < len(values):
         return snapped
+    if max(stop - start for start, stop in runs(far > SAME)) <= AROUND:
+        return snapped  # it rests there, and what is elsewhere are spikes
     far = far[away]
     # The steps, a frame, between values that are not at home: before and after each of them.
     steps = _apart(values[away[1:]], values[away[:-1]]) / np.diff(away)

@@ -12,7 +12,7 @@ from scipy import ndimage
 from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
-from interpose.observation.broken import broken
+from interpose.observation.broken import AROUND, broken
 from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
 from interpose.observation.splined import splined
@@ -321,7 +321,7 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     with np.errstate(invalid="ignore"):
         steps = _Steps(clip, turned, moved, first, turned < STILL, moved < STILL)
     alive = np.flatnonzero(np.nansum(turned, axis=0) > LIFELESS)
-    walking = np.flatnonzero(np.nansum(moved, axis=0) > LIFELESS)
+    walking = np.flatnonzero((np.nansum(moved, axis=0) > LIFELESS) & ~_resting(clip))
     if not len(alive):
         if len(clip) < max(2, clip.fps):
             return []
@@ -331,6 +331,13 @@ def _frozen(clip: Clip, turned: np.ndarray, moved: np.ndarray, first: int) -> li
     whole = np.asarray(steps.still[:, alive].all(axis=1) & steps.stopped[:, walking].all(axis=1))
     poses, stands = _frozen_poses(steps, whole, alive)
     return poses + _frozen_joints(steps, whole, alive) + _frozen_places(steps, whole, walking, stands)
+
+
+def _resting(clip: Clip) -> np.ndarray:
+    """(P,) which places that carry the body stay where they are but for spikes: of a root above the hips."""
+    places = clip.translation[:, [clip.translated.index(joint) for joint in placed(clip)]]
+    away = np.abs(places - np.median(places, axis=0)).max(axis=-1) > STILL
+    return np.array([all(stop - start <= AROUND for start, stop in runs(column)) for column in away.T], bool)
 
 
 def _frozen_poses(steps: _Steps, whole: np.ndarray, alive: np.ndarray) -> tuple[list[Finding], np.ndarray]:
