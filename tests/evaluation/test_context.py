@@ -60,7 +60,7 @@ def test_a_single_frame_beside_a_gap_is_a_key(published):
     (window,) = windows(published, ("lafan1",), "validation", most=1)
     assert context._method("auto", window, Gap(1, 3)).name == "base"
     assert context._method("auto", window, Gap(5, 45)).name == "base"
-    assert context._method("auto", window, Gap(5, 8)).name == "spline"
+    assert context._method("auto", window, Gap(5, 6)).name == "spline"
 
 
 @pytest.mark.parametrize(
