@@ -22,6 +22,7 @@ from interpose.geometry.time import (
 from interpose.methods import weights
 from interpose.methods.bodies import no_humanoid, observed_body, on_the_floor
 from interpose.methods.classical import Spline
+from interpose.methods.joining import joined
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons import ACROSS, ACROSS_TURN, FEET, PARENTS, SIDES, Mapping, find_mapping
@@ -131,6 +132,9 @@ class Base:
             *pinned(observation, body.mapping, times, body.scale * body.hand),
         )
         answer = run_long(cards, seen)
+        changes = np.flatnonzero((seen.known[1:] != seen.known[:-1]).any(axis=1)) + 1
+        answer.local = joined(answer.local, seen.known[:, :-1], changes, card.fps)
+        answer.root = joined(answer.root[:, None], seen.known[:, -1:], changes, card.fps)[:, 0]
         said = kinematics.global_rotations(answer.local, PARENTS)
         missing = ~known.all(axis=1)
         back = np.interp(through(observation, known[:, -1], clip.fps)[missing], times, np.arange(len(times)))
