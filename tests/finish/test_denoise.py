@@ -223,6 +223,28 @@ def test_frames_that_are_noisy_among_others_are_denoised_by_their_own_noise(cmu_
     assert tasks.denoise(clip).report.noise.noisy == ()
 
 
+@pytest.mark.parametrize("name", ["LeftForeArm", "RightLeg"])
+def test_a_joint_that_trembles_for_a_while_is_smoothed_alone(cmu_walk, name):
+    clip, rng = cmu_walk.slice(1, 209), np.random.default_rng(4)
+    joint, part = clip.skeleton.index(name), slice(80, 130)
+    rotation = clip.rotation.copy()
+    noise = rotations.exp(np.radians(rng.normal(0, 5.0, (50, 3))))
+    rotation[part, joint] = rotations.multiply(rotation[part, joint], noise)
+    shaken = clip.with_motion(rotation, clip.translation)
+    done = interpose.denoise(shaken)
+    (told,) = done.report.noise.noisy
+    assert told.endswith(f"({name})")
+    below = clip.skeleton.below[:, joint].copy()
+    below[joint] = False
+    assert _apart(done.clip, clip)[part, below].mean() < 0.5 * _apart(shaken, clip)[part, below].mean()
+    jumps = [measures.acceleration(one.positions())[part][:, below].mean() for one in (done.clip, shaken)]
+    assert jumps[0] < 0.2 * jumps[1]
+    # All else is as in the clean clip's own result.
+    others = np.arange(len(clip.skeleton)) != joint
+    apart = rotations.angle(done.clip.rotation, interpose.denoise(clip).clip.rotation)[:, others]
+    assert np.degrees(apart.max()) < 1.0
+
+
 def test_few_frames_a_second_are_refused(cmu_walk):
     """A clean jump at 15 frames a second would be moved by 20 cm."""
     with pytest.raises(RequestError, match="cannot be denoised"):

@@ -332,6 +332,19 @@ def test_frames_that_tremble_are_said(cmu_walk):
     assert not [one for one in scan(clip) if one.kind == "noisy"]
 
 
+def test_a_joint_that_trembles_by_itself_is_said(cmu_walk):
+    clip, rng = cmu_walk.slice(1, 209), np.random.default_rng(1)
+    rotation, joint = clip.rotation.copy(), clip.skeleton.index("LeftForeArm")
+    noise = rotations.exp(np.radians(rng.normal(0, 5.0, (40, 3))))
+    rotation[100:140, joint] = rotations.multiply(rotation[100:140, joint], noise)
+    (found,) = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "noisy"]
+    assert found.joints == ("LeftForeArm",)
+    assert abs(found.start - 100) < 8
+    assert abs(found.stop - 140) < 8
+    said = float(found.note.split(" by ")[1].split()[0])
+    assert said == pytest.approx(5.0, rel=0.3)
+
+
 @pytest.mark.parametrize(("real", "fps"), [(24, 60), (12, 60), (10, 120), (5, 60)])
 def test_motion_in_steps_is_repeated_and_neither_frozen_nor_full_of_jumps(real, fps):
     clip = motion(seconds=6, fps=real)

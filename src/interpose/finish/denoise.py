@@ -9,14 +9,14 @@ the skeleton's own bones are solved back into those.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy import ndimage
 from scipy.linalg import solveh_banded
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, few
 from interpose.finish import feet
 from interpose.finish.report import Completion, JointNoise, NoiseReport, Provenance, Report
 from interpose.finish.solve import solve
@@ -28,7 +28,7 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
-from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation
+from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
 
@@ -112,12 +112,13 @@ def denoised(
     if strength > 0 and (shaken := _shaken(filled, free)):
         filled = steadied(filled, strength * shaken)
         noise = deviation(filled.positions())
-    done, noisy = filled if strength > 0 else cut, bursts(filled)
-    # Each part by its own noise: those that are noisy last, as they are eased into what is beside them.
-    for first, last in (*_between(noisy, len(filled)), *noisy):
-        piece, own = filled.slice(first, last), free.slice(first, last)
+    done, parts = filled if strength > 0 else cut, _parts(filled, free)
+    for one in parts:
+        first, last = one.start, one.stop
+        source = done if one.joints else filled
+        piece, own = source.slice(first, last), one.free.slice(first, last)
         tremble = deviation(piece.positions())
-        noise = np.maximum(noise, tremble) if (first, last) in noisy else noise
+        noise = np.maximum(noise, tremble) if one.noisy else noise
         if strength > 0:
             calm = _smooth(piece, own, strength, tremble)
             calm = _ease(done.slice(first, last), calm, start + first > 0, start + last < len(clip))
@@ -134,16 +135,44 @@ def denoised(
     provenance[part] = np.where(lost, Provenance.METHOD, Provenance.SMOOTHED) * changed
     told = replace(
         _report(cut, done, lost, noise, start, strength),
-        noisy=tuple(f"{start + first}:{start + last}" for first, last in noisy),
+        noisy=tuple(one.told(start, clip) for one in parts if one.noisy),
     )
     report = Report("denoise", noise=told)
     return Completion(result, lambda: Raw(result), provenance, report)
 
 
-def _between(ranges: list[tuple[int, int]], frames: int) -> list[tuple[int, int]]:
-    """What lies between ranges, and is long enough to be denoised."""
-    ends = [0, *(end for some in ranges for end in some), frames]
-    return [(a, b) for a, b in zip(ends[::2], ends[1::2]) if b - a >= FEWEST]
+@dataclass(frozen=True)
+class _Part:
+    """Frames start to stop - 1, smoothed by their own noise in what is `free`.
+
+    `noisy` where the rest is not; it is then these `joints` that tremble, or all of them (none are named).
+    """
+
+    start: int
+    stop: int
+    free: Observation
+    noisy: bool = True
+    joints: tuple[int, ...] = ()
+
+    def told(self, start: int, clip: Clip) -> str:
+        """Its frames, from frame `start` of the clip on."""
+        joints = few([clip.skeleton.names[joint] for joint in self.joints])
+        return f"{start + self.start}:{start + self.stop}" + f" ({joints})" * bool(joints)
+
+
+def _parts(clip: Clip, free: Observation) -> list[_Part]:
+    """What is smoothed, in turn: those that are noisy after the rest, as they are eased into what is beside
+    them, and what single joints do at the very end. Of these the frames around go along, to ease in there."""
+    noisy, around = bursts(clip), round(BLEND * clip.fps)
+    ends = [0, *(end for some in noisy for end in some), len(clip)]
+    parts = [_Part(a, b, free, noisy=False) for a, b in zip(ends[::2], ends[1::2]) if b - a >= FEWEST]
+    parts += [_Part(a, b, free) for a, b in noisy]
+    for start, stop, joints in restless(clip):
+        alone = _free(clip, joints)
+        own = Observation(free.rotation & alone.rotation, free.translation & alone.translation)
+        if own.rotation.any():
+            parts.append(_Part(max(start - around, 0), min(stop + around, len(clip)), own, joints=joints))
+    return parts
 
 
 def _free(clip: Clip, joints: Sequence[int] | None) -> Observation:

@@ -17,7 +17,7 @@ from interpose.observation.exchange import exchanges, put_back
 from interpose.observation.observation import Gap, Observation
 from interpose.observation.splined import splined
 from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
-from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation
+from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation, restless
 from interpose.skeletons import SIDES, find_mapping
 from interpose.skeletons.carrier import hips_of, place_of, placed
 
@@ -128,7 +128,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "doubled": whole frames that are the one before while the body moves at .2 m/s or more on both sides,
       fewer than are frozen: frames that were dropped, and the last one shown once more.
     - "repeated": the same again and again: fewer frames a second than the file says.
-    - "noisy": frames in which the body trembles by more than recorded motion does: what `denoise` smooths.
+    - "noisy": frames in which the body, or a joint by itself, trembles by more than recorded motion does:
+      what `denoise` smooths.
 
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
     those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
@@ -178,7 +179,7 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
     findings += repeated + _lost(clip, findings)
     if not repeated:
         findings += _jumps(clip, known, findings)
-        findings += _noisy(clip, known)
+        findings += _noisy(clip, known, findings)
     return findings
 
 
@@ -602,18 +603,30 @@ def _still(turned: np.ndarray, moved: np.ndarray) -> np.ndarray:
         return np.asarray((turned < STILL).all(axis=1) & (moved < STILL).all(axis=1))
 
 
-def _noisy(clip: Clip, known: Observation) -> list[Finding]:
-    """Frames that tremble, where all is known."""
+def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
+    """Frames in which the body trembles, or joints do of which nothing else is found, where all is known."""
     if not known.complete or len(clip) < FEWEST:
         return []
     places = clip.positions()
     all_along = [(0, len(clip))] if deviation(places).mean() > NOISY else []
-    return [
+    found = [
         Finding(
             "noisy", None, a, b, f"trembles by {100 * deviation(places[a:b]).mean():.1f} cm along each axis"
         )
         for a, b in bursts(clip) or all_along
     ]
+    for a, b, joints in [] if all_along else restless(clip):
+        turns = 2 * np.degrees(deviation(rotations.continuous(clip.rotation[a:b, list(joints)])))
+        named = tuple(clip.skeleton.names[joint] for joint in joints)
+        note = f"trembles by {turns.max():.1f} degrees about each axis"
+        else_told = (
+            one
+            for one in findings
+            if one.joints and {*one.joints} & {*named} and one.start < b and a < one.stop
+        )
+        if not any(else_told):
+            found.append(Finding("noisy", named, a, b, note))
+    return found
 
 
 def _turning(clip: Clip, joints: list[int]) -> tuple[str, ...]:
