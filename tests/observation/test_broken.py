@@ -173,6 +173,23 @@ def test_hips_that_hop_aside_in_a_run_are_found(data, run, way):
         assert np.flatnonzero(lost).tolist() == [*range(start, start + run)]
 
 
+@pytest.mark.parametrize("hops", [(1, 1, 1), (2, 1, 2), (3, 1, 3), (3, 2, 2)])
+def test_two_hops_with_a_good_frame_or_two_between_are_found(cmu_walk, hops):
+    first, between, second = hops
+    gone = np.repeat([True, False, True], [first, between, second])
+    frames = 80 + np.flatnonzero(gone)
+    ways = np.repeat([[0.3, 0.0, 0.0], [0.0, 0.2, -0.2]], [first, second], axis=0)
+    translation = cmu_walk.translation.copy()
+    translation[frames, 0] += ways
+    seen = broken(cmu_walk.with_motion(cmu_walk.rotation, translation))
+    assert np.flatnonzero(~seen.translation[:, 0]).tolist() == frames.tolist()
+    assert seen.rotation.all()
+    knee, rotation = cmu_walk.skeleton.index("LeftLeg"), cmu_walk.rotation.copy()
+    rotation[frames, knee] = rotations.multiply(rotation[frames, knee], rotations.exp(4.0 * ways))
+    seen = broken(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert np.argwhere(~seen.rotation).tolist() == [[frame, knee] for frame in frames]
+
+
 def test_the_place_that_is_held_while_a_body_is_lost_is_lost(cmu_walk):
     """In the rest pose where he was, by a tracker that saw nobody; not of who is animated on the spot, nor
     while the hips are known."""

@@ -35,6 +35,14 @@ MANY = 5
 SPIKE, TIMES = 0.35, 10.0
 SPIKE_WAY, BENT = 0.1, 0.4
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
+# Which of the frames from the first to the last one are gone, of one run and of two near each other.
+HOP = [np.ones(run, bool) for run in range(1, AROUND + 1)]
+HOPS = [
+    np.repeat([True, False, True], [first, between, second])
+    for first in range(1, AROUND + 1)
+    for between in (1, 2)
+    for second in range(1, AROUND + 1)
+]
 NEAR = 0.7  # the product of two quaternions that are within a quarter turn
 # What rises to its height over frames is motion (toes that push off, at 30 fps): beside a spike there is less
 # than this share of it. Of 40 runs of Bandai-Namco 5 toes are taken for lost so, and 52 without it; of 498
@@ -141,10 +149,14 @@ def _lost(
         good = np.flatnonzero(~(snaps | away)[:, column])
         if len(good) > 2 * AROUND:
             if values.shape[2] == 3:
-                spikes[good, column] = _hops(own[good], far)
+                spikes[good, column] = _hops(own[good], far, HOP + HOPS)[0]
                 continue
+            near = np.searchsorted(good, np.arange(len(own))).clip(max=len(good) - 1)
             spikes[good, column], middle = _spikes(own[good], far, round(fps))
-            usual[:, column] = middle[np.searchsorted(good, np.arange(len(own))).clip(max=len(good) - 1)]
+            twice, led = _hops(_continuous(own[good]), far, HOPS)
+            middle = np.where(twice[:, None], led, middle)
+            spikes[good, column] |= twice
+            usual[:, column] = middle[near]
     return snaps, away, spikes, usual
 
 
@@ -284,25 +296,31 @@ def _bend(values: np.ndarray, start: int, stop: int) -> float:
     return float(np.linalg.norm(beside - across, axis=-1).sum())
 
 
-def _hops(places: np.ndarray, far: float) -> np.ndarray:
-    """The frames (F,) of runs of up to AROUND in which places (F, 3) are far from a cubic of Hermite.
+def _hops(values: np.ndarray, far: float, hops: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The frames (F,) in which values (F, d) are far from a cubic of Hermite, and the values with that there.
 
-    It leads over them from the velocity before to the one after. Who runs rises and falls by as much as a
-    spike within a moment: medians are lost on it, cubics are not.
+    It leads over the runs of `hops` from the velocity before to the one after. Who runs rises and falls by as
+    much as a spike within a moment: medians are lost on it, cubics are not. Two runs with one or two frames
+    between them, which are near it, are found at once: neither has a velocity on both sides.
     """
-    found, steps = np.zeros(len(places), bool), np.diff(places, axis=0)
-    for run in range(1, AROUND + 1):
-        start = np.arange(2, len(places) - run - 1)
-        share = (np.arange(1, run + 1) / (run + 1))[:, None, None]
-        before, after = places[start - 1], places[start + run]
-        leave, meet = (run + 1) * steps[start - 2], (run + 1) * steps[start + run]
+    found, usual, steps = np.zeros(len(values), bool), values.copy(), np.diff(values, axis=0)
+    for gone in hops:
+        count = len(gone)
+        start = np.arange(2, len(values) - count - 1)
+        share = (np.arange(1, count + 1) / (count + 1))[:, None, None]
+        before, after = values[start - 1], values[start + count]
+        leave, meet = (count + 1) * steps[start - 2], (count + 1) * steps[start + count]
         led = before + share**2 * (3 - 2 * share) * (after - before)
         led = led + share * (1 - share) * ((1 - share) * leave - share * meet)
-        frames = start + np.arange(run)[:, None]
-        off = _apart(places[frames], led).min(axis=0, initial=np.inf)
-        bent = _apart(after - before, (leave + meet) / 2)
-        found[frames[:, (off > far) & (bent < BENT * off)]] = True
-    return found
+        led = rotations.normalize(led) if values.shape[1] == 4 else led
+        frames = start + np.arange(count)[:, None]
+        apart = _apart(values[frames], led)
+        off, near = apart[gone].min(axis=0, initial=np.inf), apart[~gone].max(axis=0, initial=0.0)
+        bent = np.maximum(near, _apart(after - before, (leave + meet) / 2))
+        sure = (off > far) & (bent < BENT * off)
+        found[frames[gone][:, sure]] = True
+        usual[frames[gone][:, sure]] = led[gone][:, sure]
+    return found, usual
 
 
 def _real(clip: Clip, lost: np.ndarray, spikes: np.ndarray, usual: np.ndarray) -> np.ndarray:
