@@ -182,12 +182,15 @@ def test_two_hops_with_a_good_frame_or_two_between_are_found(cmu_walk, hops):
     translation = cmu_walk.translation.copy()
     translation[frames, 0] += ways
     seen = broken(cmu_walk.with_motion(cmu_walk.rotation, translation))
-    assert np.flatnonzero(~seen.translation[:, 0]).tolist() == frames.tolist()
+    lost = np.flatnonzero(~seen.translation[:, 0])
+    # All in all the body is away, the good frame between included.
+    assert {*frames} <= {*lost} <= {*range(80, frames[-1] + 1)}
     assert seen.rotation.all()
     knee, rotation = cmu_walk.skeleton.index("LeftLeg"), cmu_walk.rotation.copy()
     rotation[frames, knee] = rotations.multiply(rotation[frames, knee], rotations.exp(4.0 * ways))
     seen = broken(cmu_walk.with_motion(rotation, cmu_walk.translation))
-    assert np.argwhere(~seen.rotation).tolist() == [[frame, knee] for frame in frames]
+    assert {*frames} <= {*np.flatnonzero(~seen.rotation[:, knee])} <= {*range(79, frames[-1] + 2)}
+    assert seen.rotation.sum(axis=0).tolist().count(len(cmu_walk)) == len(cmu_walk.skeleton) - 1
 
 
 def test_the_place_that_is_held_while_a_body_is_lost_is_lost(cmu_walk):

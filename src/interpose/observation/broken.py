@@ -301,9 +301,11 @@ def _hops(values: np.ndarray, far: float, hops: list[np.ndarray]) -> tuple[np.nd
 
     It leads over the runs of `hops` from the velocity before to the one after. Who runs rises and falls by as
     much as a spike within a moment: medians are lost on it, cubics are not. Two runs with one or two frames
-    between them, which are near it, are found at once: neither has a velocity on both sides.
+    between them, which are near it, are found at once: neither has a velocity on both sides, and between two
+    that went the same way the good frame would be the spike.
     """
-    found, usual, steps = np.zeros(len(values), bool), values.copy(), np.diff(values, axis=0)
+    found, good = np.zeros((2, len(values)), bool)
+    usual, steps = values.copy(), np.diff(values, axis=0)
     for gone in hops:
         count = len(gone)
         start = np.arange(2, len(values) - count - 1)
@@ -319,8 +321,9 @@ def _hops(values: np.ndarray, far: float, hops: list[np.ndarray]) -> tuple[np.nd
         bent = np.maximum(near, _apart(after - before, (leave + meet) / 2))
         sure = (off > far) & (bent < BENT * off)
         found[frames[gone][:, sure]] = True
+        good[frames[~gone][:, sure]] = True
         usual[frames[gone][:, sure]] = led[gone][:, sure]
-    return found, usual
+    return found & ~good, usual
 
 
 def _real(clip: Clip, lost: np.ndarray, spikes: np.ndarray, usual: np.ndarray) -> np.ndarray:
