@@ -43,7 +43,8 @@ def main() -> None:
     for name, one in done.items():
         print(f"{name}: {one.report}")
     path = given.out / "path.svg"
-    line_plot(series, "along the walk, m", "across, m", "The hips from above, two seconds filled", path=path)
+    title = "The hips from above, two seconds filled"
+    line_plot(series, "along the walk, m", "across, m", title, path=path, alike=True)
     print(f"wrote {path}")
 
 

@@ -42,7 +42,8 @@ def main() -> None:
             said: (one.root[part, 0].tolist(), one.root[part, 2].tolist())
             for said, one in (("recorded", clip), ("told by its feet", done))
         }
-        line_plot(series, "x, m", "z, m", f"The way of {name} from above, {SHOWN:.0f} s", path)
+        title = f"The way of {name} from above, {SHOWN:.0f} s"
+        line_plot(series, "x, m", "z, m", title, path, alike=True)
     print(f"wrote {path}")
 
 

@@ -59,7 +59,7 @@ def test_several_files_are_done_and_found_by_programs(run, takes):
 def test_one_output_for_several_files_is_refused(run, takes):
     done = run("denoise", "takes/a.bvh", "takes/b.bvh", "-o", "out.bvh")
     assert done.code == 2
-    assert "--output names one file" in done.err
+    assert "is one file" in done.err
     assert not [*takes.parent.glob("out*")]
 
 
@@ -367,3 +367,15 @@ def test_what_a_folder_was_converted_to_is_told_as_json(run, take, tmp_path):
     assert again[0] == {"input": good["input"], "skipped": True, "code": 0}
     alone = run("convert", good["input"], "a.npz", "--json").json
     assert alone["wrote"] == {"file": "a.npz", "frames": 163, "fps": 30.0, "joints": good["joints"]}
+
+
+def test_no_folder_is_left_where_nothing_was_made(run, takes):
+    assert run("fill", "takes", "-o", "made/here", "--gap", "900:1000").code == 3
+    assert not Path("made").exists()
+    assert (
+        run(
+            "fill", "takes/a.bvh", "takes/b.bvh", "-o", "made/here", "--gap", "60:80", "--method", "spline"
+        ).code
+        == 0
+    )
+    assert sorted(path.name for path in Path("made/here").glob("*.bvh")) == ["a.bvh", "b.bvh"]

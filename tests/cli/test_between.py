@@ -238,3 +238,8 @@ def test_what_makes_no_sense_is_refused_in_three_lines(run, take, options, said)
     assert len(done.err.splitlines()) == 3
     assert said in done.err
     assert not list(take.parent.glob("*.between.*"))
+
+
+def test_files_are_described_as_they_are(run, take):
+    done = run("between", "--start", "take.bvh#3", "--target", "take.bvh#60", "--frames", "20", "-o", "b.bvh")
+    assert done.out.startswith(f"take.bvh: {len(load(take))} frames")

@@ -57,6 +57,8 @@ def test_errors_have_three_lines(run, take):
         ["--joints", ","],
         ["--frames", "now"],
         ["--frames", "4:6"],
+        ["--frames", "50:50"],
+        ["--frames", "90:50"],
         ["--frames", "100:900"],
         ["-o", "take.xyz"],
     ):

@@ -214,7 +214,11 @@ def test_networks_are_not_trained_on_test_performers(run, tmp_path):
 
 
 def test_data_that_is_not_there(run, tmp_path):
-    counted = run("data", "info", "--data", "nowhere", "--json").json
+    done = run("data", "info", "--data", "nowhere")
+    assert done.code == 3
+    assert len(done.err.splitlines()) == 3
+    (tmp_path / "empty").mkdir()
+    counted = run("data", "info", "--data", str(tmp_path / "empty"), "--json").json
     assert counted["sets"]["cmu"]["clips"] == 0
     done = run("data", "pack", "cmu", "--data", "nowhere")
     assert done.code == 3
@@ -229,7 +233,7 @@ def test_data_that_is_not_there(run, tmp_path):
 
 def test_json_is_the_only_output(run, take):
     json.loads(run("scan", "take.bvh", "--json").out)
-    json.loads(run("data", "info", "--json").out)
+    json.loads(run("data", "info", "--data", str(take.parent), "--json").out)
 
 
 def test_a_method_without_weights_has_no_card_but_an_answer(run):

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from interpose import tasks
+from interpose.errors import RequestError
 from interpose.methods import positional, registry
 from interpose.observation import Gap
 
@@ -64,3 +67,17 @@ def test_coarse_frames_are_woven_into_what_is_known():
     assert np.array_equal(woven[:20, :3], line[:20, :3])
     assert woven[30, 0] == pytest.approx(line[30, 0] + 1.0)
     assert np.abs(np.diff(woven - line, 2, axis=0)).max() < 0.2, "bent, nowhere broken"
+
+
+@pytest.mark.parametrize("time", [0.0333330, 0.033300, 0.0333333, 0.033367])
+def test_the_last_digits_of_a_frame_time_do_not_matter(cmu_walk, time):
+    clip = replace(cmu_walk, fps=1 / time)
+    done = tasks.forecast(clip, 30, samples=2, method="stmi-gan")
+    assert [one.report.gaps[0].method for one in done.samples] == ["stmi-gan"] * 2
+    assert done.spread()[-1] > 0
+
+
+def test_samples_of_what_fills_in_are_refused(cmu_walk, monkeypatch):
+    monkeypatch.setattr("interpose.finish.seams.ABSURD", 0.0)
+    with pytest.raises(RequestError, match="cannot draw 2 samples"):
+        tasks.forecast(cmu_walk, 30, samples=2, method="stmi-gan")

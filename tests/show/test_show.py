@@ -462,3 +462,15 @@ def test_player_in_a_browser(tmp_path):
     assert out["played"] is True
     assert out["options"] == {"follow": False, "trails": True, "apart": True, "loop": True, "speed": 1}
     assert np.abs(np.array(out["at"]).reshape(-1, 3) - takes()[1].positions[45]).max() < 1e-3
+
+
+@pytest.mark.parametrize("tall", [0.5, 20.0])
+def test_a_map_has_one_scale(tall):
+    turn = np.linspace(0, 2 * np.pi, 40)
+    svg = line_plot({"way": (5 + np.cos(turn), 3 + tall * np.sin(turn))}, "x", "z", "A way", alike=True)
+    (shape,) = re.findall(r'd="([^"]+)"', svg)
+    points = np.array([[float(v) for v in point.split()] for point in re.split("[ML]", shape)[1:]])
+    across, down = np.ptp(points, axis=0)
+    assert down / across == pytest.approx(tall, rel=0.02)
+    assert (points.min(axis=0) > 0).all()
+    assert (points.max(axis=0) < [760, 460]).all()

@@ -74,7 +74,8 @@ def translate(error: CycloptsError) -> RequestError:
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         given = error.keyword or next((t.keyword for t in error.argument.tokens if t.keyword), None)
         if given:
-            return RequestError(f"{given} is incomplete", "nothing follows it", see)
+            dashed = f"Write {given}=VALUE if that begins with a dash. "
+            return RequestError(f"{given} is incomplete", "no value follows it", dashed + see)
         return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without", see)
     if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
         kinds: dict[object, str] = {int: "a whole number", float: "a number"}
@@ -88,6 +89,10 @@ def translate(error: CycloptsError) -> RequestError:
     return RequestError("the command line is wrong", str(error), see)
 
 
+# What the same thing is called with other verbs.
+ALIKE = {"--gap": "--frames", "--frames": "--gap", "--out": "--output", "--output": "--out"}
+
+
 def _near(name: str, known: list[str]) -> str:
-    near = difflib.get_close_matches(name, known, n=1)
+    near = [*(n for n in [ALIKE.get(name)] if n in known), *difflib.get_close_matches(name, known, n=1)]
     return f"Did you mean {near[0]}? " if near else ""

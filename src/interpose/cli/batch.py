@@ -7,7 +7,7 @@ import json
 import os
 import re
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import nullcontext, redirect_stdout
+from contextlib import nullcontext, redirect_stdout, suppress
 from dataclasses import dataclass, field
 from functools import wraps
 from io import StringIO
@@ -44,6 +44,7 @@ def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Cal
 
     signature = inspect.signature(verb)
     writes = "output" in signature.parameters
+    optional = writes and signature.parameters["output"].default is not inspect.Parameter.empty
     before = earlier or _by_report(verb.__name__)
 
     @wraps(verb)
@@ -89,22 +90,23 @@ def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Cal
             raise _empty(file)
         if folder is not None and (folder.suffix.lower() in MOTION or folder.is_file()):
             raise RequestError(
-                "--output names one file",
+                f"{folder} is one file",
                 f"{len(files)} files are to be written",
-                "Name a folder; or leave it out: each lies beside what it was made of.",
+                "Name a folder"
+                + ("; or leave it out: each lies beside what it was made of." if optional else "."),
             )
         if writes:
             _apart([(path, place if folder is not None else path) for path, place in found.values()])
         batch = Batch(files, as_json=bool(options.get("json")))
         for path, place in found.values():
-            said, made = StringIO(), FOLDERS_MADE.set(bool(options.get("dry_run")))
+            said, made, fresh = StringIO(), FOLDERS_MADE.set(bool(options.get("dry_run"))), list[Path]()
             try:
                 if path.is_dir():
                     raise _empty(path)
                 if folder is not None:
                     options["output"] = folder / place
                     if not options.get("dry_run"):
-                        (folder / place).parent.mkdir(parents=True, exist_ok=True)
+                        fresh = _made((folder / place).parent)
                 with redirect_stdout(said) if options.get("json") else nullcontext():
                     code, skipped = one(path)
                 batch.add(code, json.loads(said.getvalue() or "null"), skipped=skipped)
@@ -124,6 +126,9 @@ def each(verb: Callable[..., int | None], earlier: Earlier | None = None) -> Cal
                 complain(told)
             finally:
                 FOLDERS_MADE.reset(made)
+                with suppress(OSError):  # what has something in it stays
+                    for one_of in fresh:
+                        one_of.rmdir()
             if not options.get("json"):
                 say()
         batch.tell()
@@ -187,6 +192,13 @@ def _by_report(verb: str) -> Earlier:
         return None if report is None else (outputs.clip, report)
 
     return earlier
+
+
+def _made(folder: Path) -> list[Path]:
+    """Make a folder; those that were not there, the innermost first."""
+    fresh = [one for one in (folder, *folder.parents) if not one.exists()]
+    folder.mkdir(parents=True, exist_ok=True)
+    return fresh
 
 
 def _empty(folder: Path) -> FileError:

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from interpose.cli.console import progress
 from interpose.cli.outputs import Outputs, finish
-from interpose.cli.reading import Reading, split_names
+from interpose.cli.reading import Reading, describe, split_names
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -83,13 +83,13 @@ def between(
     from interpose.cli.request import check_method, frame_of, path_of, pins_of
 
     check_method(method, license)
-    said, others, cut = "", dict[Path, bool](), False
+    said, others, read = "", dict[Path, bool](), None
     if file is not None and not (start or target or frames or anchor):
         clip = reading.load(file)
         chosen = [frame_of(text, clip) for text in split_names(keys)]
     elif file is None and not keys and start and target:
-        file, chosen, clip, said, others = _blocked(start, target, frames or "auto", anchor, reading)
-        cut = True
+        blocked = _blocked(start, target, frames or "auto", anchor, reading)
+        file, chosen, clip, said, others, read = blocked
     else:
         raise RequestError(
             "it is not clear what the keys are",
@@ -97,8 +97,9 @@ def between(
             "Write keys.bvh --keys 0,30,75, or --start a.bvh#0 --target a.bvh#2 --anchor a.bvh#1@30.",
         )
     outputs = Outputs.choose(file, output, "between", player)
-    for read in (file, *others):
-        outputs.check(read, force)
+    for one in (file, *others):
+        outputs.check(one, force)
+    cut = read is not None
     zero = chosen[0] if cut else 0
     points = {zero + frame: point for frame, point in path_of(path, clip).items()}
     pins = [replace(one, frames=zero + one.frames) for one in pins_of(pin, clip)]
@@ -110,14 +111,16 @@ def between(
     more: dict[str, Any] = {"retargeted": retargeted} if retargeted else {}
     more |= {"path": path} if path else {}
     more |= {"pinned": pin} if pin else {}
-    return finish("between", file, outputs, clip, done, seed, {}, said, json=json, force=force, more=more)
+    told: dict[str, Any] = {"json": json, "force": force, "more": more, "read": read}
+    return finish("between", file, outputs, clip, done, seed, {}, said, **told)
 
 
 def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
-) -> tuple[Path, list[int], Clip, str, dict[Path, bool]]:
+) -> tuple[Path, list[int], Clip, str, dict[Path, bool], list[str]]:
     """A clip that holds poses of several files at its keys, as `tasks.blocking` makes it: the file it begins
-    with, the keys, the clip, lines for the user, and the other files, each with whether it is of another rig.
+    with, the keys, the clip, lines for the user, the other files, each with whether it is of another rig, and
+    lines that say what was read.
     """
     from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
@@ -152,7 +155,9 @@ def _blocked(
     met = {when: posed(clip, frame) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
     count = None if frames == "auto" else int(frames)
     done = blocked(clips[0], at[0], clips[1], at[1], met, count)
-    return named[0][0], done.keys, done.clip, "\n".join([*said, *done.said]), others
+    files = {path: clip for (path, _), clip in zip(named, loaded)}
+    read = [line for path, clip in files.items() for line in describe(path, clip)]
+    return named[0][0], done.keys, done.clip, "\n".join([*said, *done.said]), others, read
 
 
 def _met(text: str) -> tuple[str, int]:

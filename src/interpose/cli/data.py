@@ -28,6 +28,12 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
     from interpose.datasets import DATASETS, clips
     from interpose.errors import FileError
 
+    if not data.is_dir():
+        raise FileError(
+            f"{data} is no folder",
+            "the unpacked data sets are expected there",
+            "Name it with --data; docs/data.md says where to get them.",
+        )
     found: dict[str, dict[str, Any]] = {}
     for name in DATASETS:
         try:

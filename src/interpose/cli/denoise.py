@@ -69,8 +69,9 @@ def denoise(
     outputs = Outputs.choose(file, output, "denoise", player)
     if not dry_run:
         outputs.check(file, force)
+    span = None if part is None else (part.start, part.stop)
     with progress(f"denoising {file.name}", len(clip)):
-        done = tasks.denoise(clip, strength, chosen, (part.start, part.stop) if part else None, method, seed)
+        done = tasks.denoise(clip, strength, chosen, span, method, seed)
     more = {"dry_run": True} if dry_run else {}
     more["denoised"] = done.report.to_dict()["denoised"]
     report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)

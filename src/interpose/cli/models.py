@@ -52,7 +52,7 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
         if json:
             say_json(said)
         else:
-            say("\n".join(_lines(said)))
+            say("\n".join(_lines(_brief(said))))
         return
     cards = weights.cards()
     if json:
@@ -87,6 +87,15 @@ def _said(card: Card) -> dict[str, Any]:
     """A card, and where its graph lies, for other programs to run (docs/networks.md)."""
     said = card.to_dict()
     return {"name": said.pop("name"), "file": str(card.onnx), **said}
+
+
+def _brief(said: dict[str, Any]) -> dict[str, Any]:
+    """A card to be read at a glance: how it was trained comes last, and earlier runs are counted."""
+    brief = dict(said)
+    training = dict(brief.pop("training"))
+    if earlier := training.pop("earlier", None):
+        training["earlier"] = f"{len(earlier)} runs, see --json"
+    return {**brief, "training": training}
 
 
 def _lines(value: Any, indent: str = "") -> list[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
@@ -230,15 +231,20 @@ def finish(
     json: bool,
     force: bool,
     more: dict[str, Any] | None = None,
+    read: list[str] | None = None,
     dry_run: bool = False,
 ) -> int:
-    """Write everything, print the report, and return the exit code: 4 when a gap stays open."""
+    """Write everything, print the report, and return the exit code: 4 when a gap stays open.
+
+    `read` are lines of what was read, where that is not the file as the clip is.
+    """
     report = to_json(verb, file, outputs.clip, clip, completion, seed, why, more or {})
     notes = [] if dry_run else write(outputs, force, clip, completion, report)
     if json:
         say_json(report)
     else:
-        say("\n".join([*describe(file, clip), *([said] if said else []), ""]))
+        read = describe(file, clip) if read is None else read
+        say("\n".join([*read, *([said] if said else []), ""]))
         print_report(completion, clip.fps, why)
         notes = [*licence(completion), *notes]
         say("\n".join(["", *(f"note: {note}" for note in notes), outputs.told(dry_run)]))
@@ -302,8 +308,14 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
     )
     if gaps:
         say("\n".join(_legend(gaps)), style="dim")
-    for number, note in dict.fromkeys((gap.number, note) for gap in gaps for note in gap.notes):
-        say(f"gap {number}: {note}")
+    parts = Counter(gap.number for gap in gaps)
+    said = (
+        (gap.number, f" ({gap.start}:{gap.stop})" if parts[gap.number] > 1 else "", note)
+        for gap in gaps
+        for note in gap.notes
+    )
+    for number, part, note in dict.fromkeys(said):
+        say(f"gap {number}{part}: {note}")
     for number, left in numbered(completion):
         say(f"gap {number} stays open: {left} ({seconds(len(left), fps)}), {why.get(number, 'not filled')}")
 

@@ -268,7 +268,7 @@ def rests(joints: list[str], method: str) -> list[str]:
         return []
     return [
         f"flagged: nothing of {few(joints)} is known at any frame, and {method} has only the rest pose to "
-        "say. The method cae tells it from the other joints"
+        "say. The method base tells it from the other joints"
     ]
 
 

@@ -187,5 +187,5 @@ def _check_free(path: Path, force: bool) -> None:
     if not path.parent.is_dir():
         raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
     if path.exists() and not force:
-        fix = "Choose another name, or add --force (force=True)."
+        fix = "Choose another name, or replace it: --force, in Python force=True."
         raise RequestError(what, "the file exists already", fix)

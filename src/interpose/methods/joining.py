@@ -12,7 +12,7 @@ from interpose.geometry import rotations
 from interpose.geometry.time import runs
 
 # Seconds in which a step fades.
-FADE = 0.75
+FADE = 0.3
 # Frames by which changes of what is known are apart that are told from one another.
 ALONE = 3
 

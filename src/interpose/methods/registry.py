@@ -105,7 +105,7 @@ def acting(method: Method, action: str) -> Method:
         raise RequestError(
             f"cannot make it {action} with {method.name}",
             f"{method.name} knows no actions",
-            "Use the method cmib.",
+            "Use the method base or cmib.",
         )
     return method.for_action(action)
 

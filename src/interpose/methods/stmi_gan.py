@@ -47,7 +47,8 @@ class StmiGan:
         gaps between poses, and going on from little motion."""
         paper, half = self.card.training["config"] == "paper", self.card.training["network"]["frames"] // 2
         if gap.joints is None and gap.stop == len(clip):
-            if paper and gap.start * self.card.fps < half * clip.fps:
+            # Two seconds are as many frames, whatever the last digits of the file's frame time are.
+            if paper and round(gap.start * self.card.fps / clip.fps) < half:
                 return f"it goes on from {half / self.card.fps:g} seconds of motion, and here is less"
             gap = Gap(gap.start, gap.start + 1)  # a forecast goes on as long as it is asked to
         elif gap.joints is None and paper:

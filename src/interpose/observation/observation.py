@@ -74,7 +74,8 @@ class Gap:
         """Itself, or RequestError when the range is backwards, empty or outside a clip of `frames` frames."""
         fix = f"The clip has frames 0 to {frames - 1}; write START:STOP with 0 <= START < STOP <= {frames}."
         if self.stop <= self.start:
-            raise RequestError(f"the gap {self.start}:{self.stop} is empty", "it stops before it starts", fix)
+            why = "it stops where it starts" if self.stop == self.start else "it stops before it starts"
+            raise RequestError(f"the gap {self.start}:{self.stop} is empty", why, fix)
         if self.start < 0 or self.stop > frames:
             raise RequestError(
                 f"the gap {self.start}:{self.stop} reaches outside the clip", f"it has {frames} frames", fix

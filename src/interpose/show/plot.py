@@ -12,7 +12,7 @@ import numpy as np
 from interpose.errors import RequestError
 from interpose.show import figure
 
-WIDTH, HEIGHT, LEFT, RIGHT, BOTTOM = 760, 460, 78, 26, 64
+WIDTH, HEIGHT, LEFT, RIGHT, TOP, BOTTOM = 760, 460, 78, 26, 78, 64
 INK, FAINT, PAPER, GRID = "#1f2328", "#656d76", "#ffffff", "#e4e8ed"
 COLORS = ("#2563c9", "#d9622b", "#2f8f4e", "#8b4fc6", "#b8860b", "#0f8b8d", "#c2345d", "#64748b")
 DOT = "#6b7280"
@@ -56,6 +56,11 @@ def _thin(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 def _width(words: str) -> float:
     return 7.1 * len(words)
+
+
+def _around(low: float, high: float, length: float) -> tuple[float, float]:
+    """A range of some length with the same middle."""
+    return (low + high - length) / 2, (low + high + length) / 2
 
 
 def _legend(colors: Mapping[str, str]) -> tuple[list[str], int]:
@@ -121,6 +126,7 @@ def line_plot(
     path: str | Path | None = None,
     *,
     log: bool = False,
+    alike: bool = False,
     marks: Mapping[str, float] | None = None,
 ) -> str:
     """A line chart as SVG.
@@ -130,6 +136,7 @@ def line_plot(
         xlabel, ylabel, title: words at the axes and above.
         path: where to write the picture, too (UTF-8).
         log: whether the y axis is logarithmic; values that are not above zero then interrupt the line.
+        alike: whether both axes have one scale, as on a map.
         marks: words to an x value at which a dashed line stands (a threshold).
 
     Returns:
@@ -163,13 +170,18 @@ def line_plot(
     else:
         # From zero where the values are above it and not far away: heights then compare honestly.
         room = 0.06 * (y_high - y_low) or abs(y_high) * 0.1 or 1.0
-        y_low = 0.0 if 0 <= y_low < 0.6 * y_high else y_low - room
+        y_low = 0.0 if 0 <= y_low < 0.6 * y_high and not alike else y_low - room
         y_high += room
+        if alike:
+            width, tall = WIDTH - LEFT - RIGHT, HEIGHT - BOTTOM - TOP
+            scale = max((x_high - x_low) / width, (y_high - y_low) / tall)
+            x_low, x_high = _around(x_low, x_high, scale * width)
+            y_low, y_high = _around(y_low, y_high, scale * tall)
         y_marks = ticks(y_low, y_high)
 
     colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate(lines)}
     legend, lower = _legend(colors)
-    top, height = 78 + lower, HEIGHT + lower
+    top, height = TOP + lower, HEIGHT + lower
 
     def px(value: float) -> float:
         return LEFT + (value - x_low) / (x_high - x_low) * (WIDTH - LEFT - RIGHT)
@@ -283,7 +295,7 @@ def box_plot(
 
     colors = {name: COLORS[i % len(COLORS)] for i, name in enumerate(series)}
     legend, lower = _legend({**colors, **dict.fromkeys(marked, DOT)})
-    top, height = 78 + lower, HEIGHT + lower
+    top, height = TOP + lower, HEIGHT + lower
     base = height - BOTTOM
     column = (WIDTH - LEFT - RIGHT) / len(groups)
     step = min(0.8 * column / len(series), 44.0)  # from one box of a group to the next

@@ -100,10 +100,17 @@ def forecast(
     def part(i: int) -> Callable[[float], None] | None:
         return (lambda share: progress((i + share) / samples)) if progress else None
 
-    done = [
-        fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
-        for i, drawn in enumerate(seeds)
-    ]
+    done = []
+    for i, drawn in enumerate(seeds):
+        one = fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
+        (told,) = one.report.gaps
+        if samples > 1 and told.method != one.report.method:
+            raise RequestError(
+                f"cannot draw {samples} samples",
+                f"{chosen} fails here, and {told.method}, which fills in for it, has one answer only",
+                "Ask for one: its report says why.",
+            )
+        done.append(one)
     first = done[0]
     made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
     made.samples.extend([made, *done[1:]])
