@@ -345,6 +345,16 @@ def test_a_joint_that_trembles_by_itself_is_said(cmu_walk):
     assert said == pytest.approx(5.0, rel=0.3)
 
 
+@pytest.mark.parametrize("size", [6.0, 15.0, 30.0])
+def test_a_hand_that_trembles_all_along_is_said(cmu_walk, size):
+    clip, rng = cmu_walk.slice(1, 209), np.random.default_rng(1)
+    rotation, hand = clip.rotation.copy(), clip.skeleton.index("LeftHand")
+    noise = rotations.exp(np.radians(rng.normal(0, size, (len(clip), 3))))
+    rotation[:, hand] = rotations.multiply(rotation[:, hand], noise)
+    (found,) = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "noisy"]
+    assert (found.joints, found.start, found.stop) == (("LeftHand",), 0, len(clip))
+
+
 @pytest.mark.parametrize(("real", "fps"), [(24, 60), (12, 60), (10, 120), (5, 60)])
 def test_motion_in_steps_is_repeated_and_neither_frozen_nor_full_of_jumps(real, fps):
     clip = motion(seconds=6, fps=real)

@@ -170,7 +170,8 @@ def _parts(clip: Clip, free: Observation) -> list[_Part]:
     for start, stop, joints in restless(clip):
         alone = _free(clip, joints)
         own = Observation(free.rotation & alone.rotation, free.translation & alone.translation)
-        if own.rotation.any():
+        # What trembles all along was smoothed by its own noise like all else.
+        if own.rotation.any() and stop - start < len(clip):
             parts.append(_Part(max(start - around, 0), min(stop + around, len(clip)), own, joints=joints))
     return parts
 

@@ -65,6 +65,7 @@ NO_GAPS = (
     "noisy",
 )
 STUCK = ("frozen position", "frozen body")
+TOLD = 1 / 3  # of the frames in which a joint trembles: found otherwise, it is that
 APART = 3  # frames by which what is held at once may begin and end apart
 CALIBRATION = 0.5  # seconds for which a rest pose at an end is held to be measured
 
@@ -619,12 +620,12 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         turns = 2 * np.degrees(deviation(rotations.continuous(clip.rotation[a:b, list(joints)])))
         named = tuple(clip.skeleton.names[joint] for joint in joints)
         note = f"trembles by {turns.max():.1f} degrees about each axis"
-        else_told = (
-            one
-            for one in findings
-            if one.joints and {*one.joints} & {*named} and one.start < b and a < one.stop
-        )
-        if not any(else_told):
+        told = np.zeros(b - a, bool)
+        for one in findings:
+            if one.joints and {*one.joints} & {*named}:
+                told[max(one.start - a, 0) : max(one.stop - a, 0)] = True
+        # Single spikes of what trembles are part of it.
+        if told.mean() < TOLD:
             found.append(Finding("noisy", named, a, b, note))
     return found
 

@@ -57,16 +57,17 @@ def bursts(clip: Clip) -> list[tuple[int, int]]:
 def restless(clip: Clip) -> list[tuple[int, int, tuple[int, ...]]]:
     """The frames start to stop - 1 in which some joints turn to and fro by themselves, and these joints.
 
-    Of clips as for `bursts`, and outside of these: joints whose frames meet are told together.
+    Of clips as for `bursts`, and outside of these: joints whose frames meet are told together. What trembles
+    for the most part does so in all frames.
     """
     if not _tells(clip):
         return []
     turns = 2 * trembling(rotations.continuous(clip.rotation))
-    limit = np.maximum(max(FINEST, TURNS * SLOW / clip.fps), STANDS_OUT * np.median(turns, axis=0))
+    least, usual = max(FINEST, TURNS * SLOW / clip.fps), np.median(turns, axis=0)
     known = bursts(clip)
     alone = [
         (start, stop, joint)
-        for joint, found in enumerate(_ranges(turns, limit, clip, 0.5))
+        for joint, found in enumerate(_ranges(turns, np.maximum(least, STANDS_OUT * usual), clip, 0.5))
         for start, stop in found
         if not any(start < b and a < stop for a, b in known)
     ]
@@ -77,7 +78,8 @@ def restless(clip: Clip) -> list[tuple[int, int, tuple[int, ...]]]:
             together.append((first, max(last, stop), tuple(sorted({*others, joint}))))
         else:
             together.append((start, stop, (joint,)))
-    return together
+    always = tuple(np.flatnonzero(usual > least).tolist())
+    return [(0, len(clip), always)] * bool(always) + together
 
 
 def _window(clip: Clip) -> int:
