@@ -433,3 +433,15 @@ def test_a_joint_that_never_moves_is_lost_where_the_other_side_does_for_more_tha
     for frame in (80, 120):
         rotation[frame, right] = rotations.multiply(rotation[0, right], rotations.about("X", np.array(1.0)))
     assert not any(one.kind == "frozen" for one in scan(cmu_walk.with_motion(rotation, cmu_walk.translation)))
+
+
+def test_spikes_of_a_joint_that_stands_still_are_found(cmu_walk):
+    clip = cmu_walk.slice(1, 209)
+    rotation, head = clip.rotation.copy(), clip.skeleton.index("Head")
+    rotation[:, head] = rotation[60, head]
+    assert not [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "lost"]
+    rotation[100:102, head] = rotations.multiply(
+        rotation[100:102, head], rotations.exp(np.array([0.8, 0, 0]))
+    )
+    found = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "lost"]
+    assert [(one.joints, one.start, one.stop) for one in found] == [(("Head",), 100, 102)]

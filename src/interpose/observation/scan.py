@@ -527,10 +527,12 @@ def _found(clip: Clip, findings: list[Finding]) -> np.ndarray:
 def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Values that drop out, but those that have been found already; joints that do so together are one."""
     seen = broken(clip)
-    # Joints that stand still for most of the clip have no data to be restored from.
+    # Joints that stand still for most of the clip have no data to be restored from, but for spikes.
     turned, _ = _steps(clip, Observation.full(clip))
-    lost = ~(seen.rotation & seen.translation) & ((turned > STILL).mean(axis=0) > 0.5)
-    lost &= ~_found(clip, findings)
+    lost = ~(seen.rotation & seen.translation) & ~_found(clip, findings)
+    for joint in np.flatnonzero((turned > STILL).mean(axis=0) <= 0.5):
+        for start, stop in runs(lost[:, joint]):
+            lost[start:stop, joint] = stop - start <= AROUND
     together: dict[tuple[int, int], list[str]] = {}
     for name, column in zip(clip.skeleton.names, lost.T):
         for run in runs(column):
