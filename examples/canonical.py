@@ -6,7 +6,8 @@ From each set the frames of people who walk ahead, upright and at an even pace a
 how far the mean canonical rotations of their joints are apart, relative to where the body faces, in degrees;
 beside it how far single walks of one set are from its own mean, and how far LAFAN1 and PFNN, which share a
 skeleton, are apart with one T-pose for both, so that only people differ. The picture shows the walk nearest
-to each set's mean. HDM05's classes that were at hand hold no walk.
+to each set's mean. HDM05's classes that were at hand hold no walk. With --own each walk tells the T-pose of
+its rig anew, as for rigs of which none is known, and no picture is drawn.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from interpose.geometry import rotations
 from interpose.show import Take, strip
 from interpose.skeletons import BONES, JOINTS, PARENTS, canonical_positions, find_humanoid
 from interpose.skeletons.body import facing
-from interpose.skeletons.rest import Rest
+from interpose.skeletons.rest import Rest, estimate
 
 SETS = {"lafan1": "#2463c8", "pfnn": "#dd5f28", "cmu": "#2a9d5c", "bandai": "#8a4fbf"}
 FRAMES = 48  # of the picture
@@ -54,16 +55,20 @@ def at_30(clip: Clip) -> Clip:
     return clip.with_motion(clip.rotation[::step], clip.translation[::step])
 
 
-def walks(name: str, data: Path, rest: Rest | None = None) -> tuple[np.ndarray, np.ndarray | None]:
+def walks(
+    name: str, data: Path, rest: Rest | None = None, own: bool = False
+) -> tuple[np.ndarray, np.ndarray | None]:
     """Mean rotations (W, 22, 4) of a set's walks; positions (FRAMES, 22, 3) of the one nearest to their mean.
 
-    rest: the T-pose, where it shall not be found for each clip.
+    rest: the T-pose, where it shall not be found for each clip; own: worked out anew where it is a known one.
     """
     entries = [e for e in clips(name, data) if e.split != "test" and (name != "bandai" or "walk" in e.label)]
     found, shown = [], []
     for i in np.linspace(0, len(entries) - 1, min(CLIPS, len(entries))).astype(int):
         clip = at_30(entries[i].load())
         body = find_humanoid(clip, rest)
+        if own and body.rest.how == "rig":
+            body = find_humanoid(clip, Rest(estimate(body.mapping, clip), body.rest.pose, "motion"))
         points = body.positions(clip) * body.scale
         yaw = facing(points)
         steady = walking(points, yaw)
@@ -85,18 +90,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--data", type=Path, required=True, help="the folder that holds the data sets")
     parser.add_argument("--out", type=Path, default=Path("docs/pictures"))
+    parser.add_argument("--own", action="store_true", help="T-poses that each walk tells by itself")
     given = parser.parse_args()
     means, spread, takes = {}, [], []
     for name, color in SETS.items():
-        found, shown = walks(name, given.data)
+        found, shown = walks(name, given.data, own=given.own)
         means[name] = mean(found)
         spread.append(np.degrees(rotations.angle(found, means[name])).mean(axis=0))
         print(f"{name}: {len(found)} walks")
         if shown is not None:
             takes.append(Take(name, shown, color))
-    given.out.mkdir(parents=True, exist_ok=True)
-    title = "One figure, walks of four data sets"
-    strip(takes, PARENTS, 30, [], given.out / "canonical.svg", title, names=JOINTS)
+    if not given.own:
+        given.out.mkdir(parents=True, exist_ok=True)
+        title = "One figure, walks of four data sets"
+        strip(takes, PARENTS, 30, [], given.out / "canonical.svg", title, names=JOINTS)
     # PFNN's clips are on LAFAN1's skeleton: with one T-pose for both, what is left is how people walk.
     first = clips("lafan1", given.data, "train")[0]
     rest = find_humanoid(at_30(first.load())).rest

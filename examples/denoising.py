@@ -1,4 +1,4 @@
-"""A noisy walk, denoised: the picture and the page of the README.
+"""A noisy walk, denoised: the picture of docs/results.md, and a page that plays it.
 
     python examples/denoising.py --out docs/pictures
 
@@ -43,13 +43,18 @@ def main() -> None:
     names, parents, everything = clip.skeleton.names, clip.skeleton.parents, [(0, len(clip))]
     title = "A walk under noise"
     drawn = strip(takes, parents, clip.fps, everything, title=title, names=names, span=(30, 110))
-    # All frames are drawn like those of a gap, but nothing is missing.
-    drawn = re.sub(r'<rect class="gap".*?</text>\n', "", drawn, flags=re.DOTALL)
+    given.out.mkdir(parents=True, exist_ok=True)
     path = given.out / "denoising.svg"
-    path.write_text(drawn.replace("gray: observed, ", ""), encoding="utf-8")
+    path.write_text(whole(drawn), encoding="utf-8")
     takes[0] = Take("recorded", clip.positions(), "#64748b", ghost=True)
     player(takes, parents, clip.fps, [], path.with_suffix(".html"), title, names=names)
     print(f"wrote {path}, {path.with_suffix('.html')}")
+
+
+def whole(drawn: str) -> str:
+    """A strip all of whose frames are drawn in the color of a gap, without the gap: nothing is missing."""
+    drawn = re.sub(r'<rect class="gap".*?</text>\n', "", drawn, flags=re.DOTALL)
+    return drawn.replace("gray: observed, ", "")
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from importlib import resources
 from pathlib import Path
 
 import numpy as np
+from denoising import whole
 
 import interpose
 from interpose.geometry.time import resample
@@ -30,6 +31,7 @@ RIGS = {
 }
 TOES = [JOINTS.index("LeftToe"), JOINTS.index("RightToe")]
 STANDS = 0.05  # metres a second
+OWN, OTHER = "#64748b", "#d1495b"
 
 
 def speeds(clip: interpose.Clip) -> np.ndarray:
@@ -57,20 +59,23 @@ def main() -> None:
         back = interpose.retarget(made[name], clip).positions() - clip.positions()
         off = 100 * np.linalg.norm(back, axis=-1)[:, mapped].mean()
         print(f"{name}: {100 * speeds(made[name])[stands].mean():.1f} cm/s, {off:.1f} cm off once it is back")
-    strips = [
-        strip(
-            [Take(name, one.positions()[:, list(find_mapping(one.skeleton).mapped[1])], color)],
-            parents(one),
-            one.fps,
-            [interpose.Gap(0, len(one))],
-            title=f"CMU 49_02 on {name}",
-            count=10,
-            span=SHOWN,
-        )
-        for (name, one), color in zip(made.items(), ("#6b7280", *["#d1495b"] * len(RIGS)))
-    ]
-    sheet(strips, given.out / "rigs.svg")
+    given.out.mkdir(parents=True, exist_ok=True)
+    sheet(
+        [drawn(name, one, OWN if one is clip else OTHER) for name, one in made.items()],
+        given.out / "rigs.svg",
+    )
     print(f"wrote {given.out / 'rigs.svg'}")
+
+
+def drawn(name: str, clip: interpose.Clip, color: str) -> str:
+    """The mapped joints of a clip as a strip."""
+    rows, mapped = find_mapping(clip.skeleton).mapped
+    take = Take(name, clip.positions()[:, list(mapped)], color)
+    title, names = f"CMU 49_02 on {name}", [JOINTS[row] for row in rows]
+    every = [(0, len(clip))]
+    return whole(
+        strip([take], parents(clip), clip.fps, every, title=title, names=names, count=10, span=SHOWN)
+    )
 
 
 def parents(clip: interpose.Clip) -> list[int]:

@@ -2,9 +2,10 @@
 
     python examples/trembling.py --out demo
 
-The walk is a clip of the tests (mocap.cs.cmu.edu). Its left forearm is turned by noise of 6 degrees about each
-axis for a second and a half. What is printed is how far joints are from the recorded walk before and after,
-and how much the hand is thrown about; trembling.bvh and trembling.denoised.bvh are written to --out.
+The walk is a clip of the tests (mocap.cs.cmu.edu). Its left forearm is turned by noise of 6 degrees about
+each axis for a second and a half. What is printed is how far the hand is from the recorded one before and
+after, by some options, how much it is thrown about, and how far feet are moved. trembling.bvh and
+trembling.denoised.bvh are written to --out.
 """
 
 from __future__ import annotations
@@ -47,19 +48,24 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=Path("demo"))
     given = parser.parse_args()
     clip = interpose.load(WALK)
-    made = {"recorded": clip, "trembling": shaken(clip)}
-    done = interpose.denoise(made["trembling"])
-    made["denoised"] = done.clip
+    noisy = shaken(clip)
+    done = interpose.denoise(noisy)
     print(done.report)
+    made = {"recorded": clip, "trembling": noisy, "denoised": done.clip}
+    for frames in ((92, 136), (80, 145)):
+        said = f"denoised, --joints {JOINT} --frames {frames[0]}:{frames[1]}"
+        made[said] = interpose.denoise(noisy, joints=[JOINT], frames=frames).clip
+    for strength in (0.5, 2.0):
+        made[f"denoised, --strength {strength:g}"] = interpose.denoise(noisy, strength).clip
     for name, one in made.items():
         off = apart(one, clip, HAND)[PART]
         print(
             f"{name}: the hand is off by {off.mean():.1f} cm in the mean, {off.max():.1f} at most, and "
-            f"accelerates by {accelerated(one):.0f} m/s^2"
+            f"accelerates by {accelerated(one):.0f} m/s^2; feet are moved by "
+            f"{10 * apart(one, clip, *FEET).max():.1f} mm at most"
         )
-    print(f"feet are moved by {10 * apart(done.clip, clip, *FEET).max():.1f} mm at most")
     given.out.mkdir(parents=True, exist_ok=True)
-    for name, one in (("trembling.bvh", made["trembling"]), ("trembling.denoised.bvh", done.clip)):
+    for name, one in (("trembling.bvh", noisy), ("trembling.denoised.bvh", done.clip)):
         interpose.save(one, given.out / name, force=True)
     print(f"wrote {given.out / 'trembling.bvh'}, {given.out / 'trembling.denoised.bvh'}")
 
