@@ -65,3 +65,15 @@ def test_a_walk_in_a_circle_goes_on_along_it(walk, side):
     assert np.degrees(found.rate) == pytest.approx(side, abs=0.2)
     yaw = found.yaw + found.rate * 11
     assert np.degrees(np.angle(np.exp(1j * yaw))) == pytest.approx(0, abs=6)
+
+
+def test_who_stands_is_no_cycle_of_a_walk(walk):
+    """Standing is more like itself than any stride."""
+    at = np.concatenate([np.arange(90), np.full(60, 90)])
+    rotation = rotations.multiply(
+        walk.rotation[at],
+        rotations.exp(np.random.default_rng(0).normal(0, 2e-3, (150, len(walk.skeleton), 3))),
+    )
+    found = tasks.cycle(walk.with_motion(rotation, walk.translation[at]))
+    assert found.stop <= 92
+    assert found.stop + found.frames - found.start == pytest.approx(41, abs=4)

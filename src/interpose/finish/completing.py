@@ -14,7 +14,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.finish import pins
 from interpose.finish.guarantees import Ask, guaranteed
-from interpose.finish.loose import Layer, loose, without
+from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.opinion import certain, wipe
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance
@@ -22,8 +22,6 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Pin
 
-# A share of all joints: so many laid on a body are most of it.
-MOST = 0.5
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
 # Metres by which nobody is led elsewhere.
@@ -85,7 +83,7 @@ def _complete(
 def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
     """Complete the body on which known joints (F, J) hang, and lay them on it."""
     body = _complete(clip, without(observation, hanging), ask, None)
-    layer = Layer(ask.method.name, body.clip, body.raw, hanging)
+    layer = Layer(ask.method.name, body.clip, body.raw, hanging, stands=hanging.any(axis=0).mean() < MOST)
     # Where some joints that are laid on a body jump, another body would not help: it is said, and this
     # one kept. Where most of them are, it is rather the body that does not fit.
     simpler: Method = layer if hanging.any(axis=0).mean() < MOST else ask.fallback

@@ -29,6 +29,8 @@ STOOD = "what the body stands on tells where it is"
 STEPS = "the body turns on the spot, in steps"
 # Rounds in which velocity jumps above the limit are softened.
 ROUNDS = 24
+# One that came no nearer to it, by this share, in so many of them than before is left as it is.
+STALLED, NEARER = 3, 0.998
 # A simpler method takes over where it pops by less than this share of what the method does: the hand of a
 # body that falls jumps with either.
 LESS = 0.9
@@ -158,9 +160,17 @@ class _Work:
                 _lift(current, self.firm, span)
         if self.bounds is None:
             return
+        waiting, told = set(range(len(chosen))), [list[float]() for _ in chosen]
         for _ in range(ROUNDS):
-            for span in chosen:
-                jumps.soften(current, self.firm, span, self.bounds.seam)
+            # What a span does can be seen from its neighbours, and from no other.
+            beside: set[int] = set()
+            for i, span in enumerate(chosen):
+                if i not in waiting | beside or _stalls(told[i]):
+                    continue
+                if excess := jumps.soften(current, self.firm, span, self.bounds.seam):
+                    told[i].append(excess)
+                    beside |= {i - 1, i, i + 1}
+            waiting = beside
 
     def fall_back(self) -> None:
         """Let the simpler method fill the spans in which the method's motion does not do, where it does
@@ -249,6 +259,12 @@ class _Work:
 
     def _of(self, gap: Gap) -> Span:
         return next(span for span in self.spans if span.start <= gap.start and gap.stop <= span.stop)
+
+
+def _stalls(told: list[float]) -> bool:
+    """Whether what was told in the last rounds is no nearer to what it should be than what was before."""
+    recent, before = told[-STALLED:], told[:-STALLED]
+    return bool(before) and min(recent) > NEARER * min(before)
 
 
 def _lost(opinion: Clip, hidden: Clip, known: Observation, span: Span) -> str | None:

@@ -148,14 +148,18 @@ def _led_over(
     return min(found, key=lambda one: one[0])[1:]
 
 
-def soften(current: Clip, known: Observation, span: Span, limits: np.ndarray) -> None:
-    """Bring the jumps at the seams of a span below the limits (J,) of joints (metres per frame squared)."""
+def soften(current: Clip, known: Observation, span: Span, limits: np.ndarray) -> float:
+    """Bring the jumps at the seams of a span below the limits (J,) of joints (metres per frame squared).
+
+    Returns how many times too large the largest one was, or 0 where there was nothing to do.
+    """
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     if not edges.size:
-        return
+        return 0.0
     size = np.linalg.norm(seams.seam_jumps(current, known, edges), axis=-1)
     if not (size > limits).any() or size.max() >= KINK / current.fps:
-        return
+        return 0.0
     lo, hi, inner = span.around(len(current), 2)
     softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limits)
     write(current, softer, span.start, inner)
+    return float((size / limits).max())

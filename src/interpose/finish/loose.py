@@ -33,6 +33,10 @@ def without(observation: Observation, some: np.ndarray) -> Observation:
     return replace(observation, rotation=observation.rotation & ~some)
 
 
+# A share of all joints: so many laid on a body are most of it.
+MOST = 0.5
+
+
 @dataclass
 class Layer:
     """A finished completion of the body as a method, with the loose joints (F, J) laid on it.
@@ -63,4 +67,19 @@ class Layer:
         )
         rotation = rotations.multiply(self.body.rotation, change.clip.rotation)
         own = self.body.with_motion(rotation, self.body.translation)
+        if self.joints.any(axis=0).mean() > MOST:
+            own = _turned(own, self.body, observation.rotation)
         return Raw(own, notes=self.raw.notes, stands=self.raw.stands, expected=self.raw.expected)
+
+
+def _turned(own: Clip, body: Clip, known: np.ndarray) -> Clip:
+    """The clip with its roots turned, where they are not `known` (F, J), so that joints are nearest to those
+    of the body: of a pose that is known but for which way it faces the body has a pose of its own."""
+    rotation, skeleton = own.rotation.copy(), own.skeleton
+    places, wanted = own.positions(), body.positions()
+    for root in skeleton.roots:
+        frames = np.flatnonzero(~known[:, root])
+        below = np.flatnonzero(skeleton.below[:, root])
+        vectors, there = (some[frames][:, below] - some[frames][:, [root]] for some in (places, wanted))
+        rotation[frames, root] = rotations.multiply(rotations.fit(vectors, there), rotation[frames, root])
+    return own.with_motion(rotation, own.translation)

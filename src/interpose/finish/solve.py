@@ -222,8 +222,8 @@ def refine(
     """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
-    this shares it out. Damping keeps what positions do not tell. `weights` (F, n) says how much each position
-    counts; default: all the same. `hinges` hold knees and elbows to how they bend.
+    this shares it out. Damping keeps what positions do not tell. `weights` (F, n), or (F, n, 3) by axis, says
+    how much each position counts; default: all the same. `hinges` hold knees and elbows to how they bend.
     """
     freedom = Freedom.of(clip, observation, joints, hinges)
     for _ in range(STEPS):
@@ -326,7 +326,10 @@ class Freedom:
         by_shift = np.broadcast_to(self.by_shift, (frames, *self.by_shift.shape))
         jacobian = np.concatenate([by_turn, by_shift], axis=2) * self.free[:, None]
         miss = (positions - placed[:, self.known]).reshape(frames, -1, 1)
-        heavy = 1.0 if weights is None else np.repeat(weights, 3, axis=1)[:, None]
+        if weights is None:
+            weights = np.ones(positions.shape)
+        axes = weights if weights.ndim == 3 else np.repeat(weights[..., None], 3, axis=2)
+        heavy = axes.reshape(frames, 1, -1)
         transposed = np.swapaxes(jacobian, 1, 2) * heavy
         normal, towards = transposed @ jacobian, transposed @ miss
         for joint, stiff, pull in self.hinges.pulls(clip, turned) if self.hinges else ():

@@ -24,6 +24,7 @@ ALIKE = 0.5
 # Seconds that a motion which goes round takes at most; and the share of what its poses are from their mean
 # within which it comes back.
 ROUND, CLOSES = 8.0, 0.5
+LIVELY = 0.7  # of the pace of a whole clip: what moves less than that stands in it
 TURNED = 0.05  # metres that joints may be apart instead of the body going round by a radian
 
 
@@ -115,7 +116,8 @@ def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
     """The frames of a motion between which it may go round: at the second one it is as it was at the first,
     in pose and pace, and heads about where it did; and by how many metres joints are apart there.
 
-    The two that are most alike, from SHORTEST to ROUND seconds apart. None where nothing comes back.
+    The two that are most alike, from SHORTEST to ROUND seconds apart, of those between which it moves as the
+    whole of it does: who stands is most alike. None where nothing comes back.
     """
     least, most = max(1, round(SHORTEST * clip.fps)), min(round(ROUND * clip.fps), len(clip) - 1)
     if least > most:
@@ -127,9 +129,11 @@ def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
     ways = turn(np.gradient(hips[:, 0], axis=0), -faces)
     paces = AHEAD * clip.fps * (np.gradient(around, axis=0) + ways[:, None])
     seen = np.concatenate([around, paces], axis=1)
+    gone = np.cumsum(np.linalg.norm(paces, axis=2).mean(axis=1))
     best = (np.inf, 0, 0)
     for lag in range(least, most + 1):
         apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
+        apart[gone[lag:] - gone[:-lag] < LIVELY * lag * gone[-1] / len(clip)] = np.inf
         apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
         at = int(apart.argmin())
         best = min(best, (float(apart[at]), at, at + lag))

@@ -146,6 +146,18 @@ class Pin:
         return replace(self, frames=frames[inside] - start, position=position, orientation=orientation)
 
 
+def _flags(values: object) -> np.ndarray:
+    """True where something is known; RequestError for what does not say so, as a tracker's confidences."""
+    flags = np.asarray(values)
+    if flags.dtype != bool and not (flags.dtype.kind in "iuf" and np.isin(flags, (0, 1)).all()):
+        raise RequestError(
+            "an observation says of each value whether it is known",
+            f"its array of {flags.dtype} holds something else than True and False",
+            "Compare confidences with the least one to be trusted, as in confidence > 0.5.",
+        )
+    return flags.astype(bool, copy=False)
+
+
 @dataclass(frozen=True, eq=False)
 class Observation:
     """Which values of a clip are known.
@@ -155,6 +167,9 @@ class Observation:
         translation: (F, J) True where the local translation is known (the root's is a column of it;
             joints without animated translation are always known).
         pins: known global positions.
+
+    Raises:
+        RequestError: the arrays are not (F, J), or hold something else than True and False (or 1 and 0).
     """
 
     rotation: np.ndarray
@@ -163,8 +178,8 @@ class Observation:
 
     def __post_init__(self) -> None:
         fill = object.__setattr__
-        fill(self, "rotation", np.asarray(self.rotation, bool))
-        fill(self, "translation", np.asarray(self.translation, bool))
+        fill(self, "rotation", _flags(self.rotation))
+        fill(self, "translation", _flags(self.translation))
         if self.rotation.shape != self.translation.shape or self.rotation.ndim != 2:
             raise RequestError(
                 "the observation does not fit",
