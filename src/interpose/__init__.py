@@ -137,7 +137,8 @@ def fill(
         clip: a clip, or the path of one. Its values inside the gaps have no influence.
         gaps: one or several, each a Gap, "120:160" for frames 120 to 159, "4s:5.3s", "120:" to the end,
             (120, 160) or (120, 160, ["LeftArm"]), or a row of an array (n, 2). An Observation says for
-            every value whether it is known. None: what a scan of the clip finds.
+            every value whether it is known. None: what a scan of the clip finds; of an empty list nothing is
+            filled.
         method: one of `method_names()`, or "auto" for what measured best at each gap's length.
         max_gap: frames, or seconds as in "2s"; longer gaps stay open.
         only: numbers of the gaps to fill, one or several, counted from 1 in order of time; the others stay
@@ -147,14 +148,15 @@ def fill(
         parts: poses of single joints that other clips give inside of the gaps.
         path: floor points (x and z in metres) that the hips are led over, by frame: {130: (1.2, 0.4)}.
         pins: where joints are to be at frames inside of gaps: Pin("LeftHand", [130], [[0.3, 1.4, 0.2]]) in
-            metres, Y up. What is out of reach is met as nearly as it can be, and reported.
+            metres, Y up. What is out of reach is met as nearly as it can be, and reported. Networks are told
+            of pins, and the body goes along: by some centimetres also where a joint was there anyway.
 
     Returns:
         The completion: `.clip`, `.report` (one entry a gap; `.report.open` lists what was left), `.raw` and
         `.provenance`.
 
     Raises:
-        NothingError: no gaps were given, and a scan finds none.
+        NothingError: gaps are None, and a scan finds none.
         RequestError: a range, joint, number or method that does not exist.
         FileError: the file cannot be read.
     """
