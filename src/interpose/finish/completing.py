@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import pins
+from interpose.finish import feet, pins
 from interpose.finish.guarantees import Ask, guaranteed
 from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.opinion import certain, wipe
@@ -83,7 +83,9 @@ def _complete(
 def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
     """Complete the body on which known joints (F, J) hang, and lay them on it."""
     body = _complete(clip, without(observation, hanging), ask, None)
-    layer = Layer(ask.method.name, body.clip, body.raw, hanging, stands=hanging.any(axis=0).mean() < MOST)
+    # On other legs a body stands anew.
+    legs = hanging[:, feet.ends(clip.skeleton)].any()
+    layer = Layer(ask.method.name, body.clip, body.raw, hanging, stands=not legs)
     # Where some joints that are laid on a body jump, another body would not help: it is said, and this
     # one kept. Where most of them are, it is rather the body that does not fit.
     simpler: Method = layer if hanging.any(axis=0).mean() < MOST else ask.fallback
