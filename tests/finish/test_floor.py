@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose import fill
 from interpose.finish import complete, feet, floor, measures
@@ -178,9 +179,11 @@ def _asked(clip, seen):
     return joints, np.maximum(deep - floor.SINK, 0.0)
 
 
+@pytest.mark.parametrize("rooted", [False, True])
 @pytest.mark.parametrize(("name", "gap", "most"), [("cmu_walk", (80, 130), 3.6), ("cmu_jump", (40, 80), 3.0)])
-def test_a_pose_that_is_known_but_for_its_hips_turn_faces_as_the_body_does(data, name, gap, most):
+def test_a_pose_that_is_known_but_for_its_hips_turn_faces_as_the_body_does(data, name, gap, most, rooted):
     clip = load(data / f"{name}.bvh")
+    clip = under_root(clip, goes=False) if rooted else clip
     done = fill(clip, [Gap(*gap, ("Hips",))], method="small-open").clip
     inside = slice(*gap)
     off = 100 * np.linalg.norm(done.positions() - clip.positions(), axis=-1)[inside]

@@ -16,15 +16,17 @@ from interpose.geometry import rotations
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Pin
+from interpose.skeletons.carrier import hips_of
 
 
 def loose(clip: Clip, observation: Observation) -> np.ndarray:
-    """(F, J) True for rotations that are known in frames in which their root's is not."""
+    """(F, J) True for rotations that are known in frames in which that of their root is not, or that of the
+    hips that they hang from."""
     skeleton = clip.skeleton
-    found = np.zeros_like(observation.rotation)
+    found, tops = np.zeros_like(observation.rotation), {*skeleton.roots, hips_of(skeleton)}
     for joint in range(len(skeleton)):
-        root = next((above for above in skeleton.ancestors(joint) if skeleton.parents[above] < 0), joint)
-        found[:, joint] = observation.rotation[:, joint] & ~observation.rotation[:, root]
+        if above := [top for top in skeleton.ancestors(joint) if top in tops]:
+            found[:, joint] = observation.rotation[:, joint] & ~observation.rotation[:, above].all(axis=1)
     return found
 
 
@@ -73,13 +75,14 @@ class Layer:
 
 
 def _turned(own: Clip, body: Clip, known: np.ndarray) -> Clip:
-    """The clip with its roots turned, where they are not `known` (F, J), so that joints are nearest to those
+    """The clip with its hips turned, where they are not `known` (F, J), so that joints are nearest to those
     of the body: of a pose that is known but for which way it faces the body has a pose of its own."""
-    rotation, skeleton = own.rotation.copy(), own.skeleton
-    places, wanted = own.positions(), body.positions()
-    for root in skeleton.roots:
-        frames = np.flatnonzero(~known[:, root])
-        below = np.flatnonzero(skeleton.below[:, root])
-        vectors, there = (some[frames][:, below] - some[frames][:, [root]] for some in (places, wanted))
-        rotation[frames, root] = rotations.multiply(rotations.fit(vectors, there), rotation[frames, root])
+    skeleton, hips, rotation = own.skeleton, hips_of(own.skeleton), own.rotation.copy()
+    frames, below = np.flatnonzero(~known[:, hips]), np.flatnonzero(skeleton.below[:, hips])
+    (turned, places), wanted = own.kinematics(), body.positions()
+    vectors, there = (some[frames][:, below] - some[frames][:, [hips]] for some in (places, wanted))
+    facing = rotations.multiply(rotations.fit(vectors, there), turned[frames, hips])
+    if (parent := skeleton.parents[hips]) >= 0:
+        facing = rotations.multiply(rotations.conjugate(turned[frames, parent]), facing)
+    rotation[frames, hips] = facing
     return own.with_motion(rotation, own.translation)
