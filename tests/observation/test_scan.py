@@ -445,3 +445,14 @@ def test_spikes_of_a_joint_that_stands_still_are_found(cmu_walk):
     )
     found = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "lost"]
     assert [(one.joints, one.start, one.stop) for one in found] == [(("Head",), 100, 102)]
+
+
+def test_single_spikes_are_no_trembling(cmu_walk):
+    clip = cmu_walk.slice(1, 209)
+    rotation, thumb = clip.rotation.copy(), clip.skeleton.index("RThumb")
+    for frame in (100, 106):
+        rotation[frame, thumb] = rotations.multiply(
+            rotation[frame, thumb], rotations.exp(np.array([2.5, 0, 0]))
+        )
+    kinds = [one.kind for one in scan(clip.with_motion(rotation, clip.translation)) if one.start > 60]
+    assert set(kinds) == {"lost"}

@@ -618,7 +618,7 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         )
         for a, b in bursts(clip) or all_along
     ]
-    for a, b, joints in [] if all_along else restless(clip):
+    for a, b, joints in [] if all_along else restless(_without_spikes(clip, findings)):
         turns = 2 * np.degrees(deviation(rotations.continuous(clip.rotation[a:b, list(joints)])))
         named = tuple(clip.skeleton.names[joint] for joint in joints)
         note = f"trembles by {turns.max():.1f} degrees about each axis"
@@ -630,6 +630,18 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         if told.mean() < TOLD:
             found.append(Finding("noisy", named, a, b, note))
     return found
+
+
+def _without_spikes(clip: Clip, findings: list[Finding]) -> Clip:
+    """The clip with the turns that lead over what is lost: one spike is no trembling."""
+    rotation, names = clip.rotation.copy(), clip.skeleton.names
+    for one in findings:
+        if one.kind == "lost" and one.joints and one.start > 0 and one.stop < len(clip):
+            joints = [names.index(joint) for joint in one.joints]
+            share = np.arange(1, len(one) + 1)[:, None] / (len(one) + 1)
+            before, after = (rotation[[frame]][:, joints] for frame in (one.start - 1, one.stop))
+            rotation[one.start : one.stop, joints] = rotations.slerp(before, after, share)
+    return clip.with_motion(rotation, clip.translation)
 
 
 def _turning(clip: Clip, joints: list[int]) -> tuple[str, ...]:
