@@ -2,7 +2,8 @@
 
 Networks are told where joints are, and of such an arm nobody knows where it is. So the body is completed
 first, and the joints are laid on it: what they differ by is known where they are known, nothing outside of
-the gap, and a spline in between. (Kaufmann et al. 2020, figure 7, blend this way.)
+the gap, and a spline in between. (Kaufmann et al. 2020, figure 7, blend this way.) Where most of a pose is
+known so, its hips are turned to where the completed body's joints are.
 """
 
 from __future__ import annotations
