@@ -19,7 +19,7 @@ demo: $(CORE)/.installed ## fill a gap in a real clip and show the result (insta
 	@$(CORE)/bin/interpose demo
 
 test: lint $(NODE)/.installed ## all checks and all tests (installs torch)
-	@OMP_NUM_THREADS=1 $(TEST)/bin/python -m pytest
+	@OMP_NUM_THREADS=1 $(TEST)/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 
 lint: $(TEST)/.installed ## style, types and the direction of imports
 	@$(TEST)/bin/ruff check

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from interpose.geometry import rotations
+from interpose.geometry import rotations, values
 
 ORDERS = ["".join(order) for order in itertools.product("XYZ", repeat=3)]
 ORDERS = [order for order in ORDERS if order[0] != order[1] != order[2]]
@@ -42,6 +42,18 @@ def test_product_rotation_and_inverse(kind):
     np.testing.assert_allclose(kind.numpy(turned), scipy(a).apply(v), atol=4 * kind.tolerance)
     back = rotations.multiply(kind.array(a), rotations.conjugate(kind.array(a)))
     assert distance(kind.numpy(back), np.array([1.0, 0, 0, 0])) < kind.tolerance
+    seen = rotations.relative(kind.array(a), kind.array(b))
+    assert distance(kind.numpy(seen), unscipy(scipy(a).inv() * scipy(b))) < kind.tolerance
+
+
+def test_what_leads_from_one_value_to_another_leads_there(kind):
+    for a, b in (
+        (quaternions(seed=1), quaternions(seed=2)),
+        np.random.default_rng(3).normal(size=(2, 50, 3)),
+    ):
+        way = values.offset(kind.array(a), kind.array(b))
+        assert way.shape == (len(a), 3)
+        assert distance(kind.numpy(values.moved(kind.array(a), way)), b) < 4 * kind.tolerance
 
 
 def test_leading_axes_broadcast(kind):

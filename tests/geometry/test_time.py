@@ -33,6 +33,14 @@ def apart(a: np.ndarray, b: np.ndarray) -> float:
     return float(rotations.angle(a, b).max())
 
 
+def test_easing_begins_and_ends_at_rest():
+    share = np.linspace(0, 1, 101)
+    eased = time.ease(share)
+    assert (eased[0], eased[50], eased[-1]) == (0, 0.5, 1)
+    assert (np.diff(eased) > 0).all()
+    assert np.diff(eased)[[0, -1]].max() < 0.04 * np.diff(eased).max()
+
+
 def test_sampling_at_and_between_samples(kind):
     values = np.random.default_rng(0).normal(size=(5, 2, 3))
     times = kind.array([0.0, 1.0, 1.25, 4.0, -1.0, 9.0])

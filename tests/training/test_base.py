@@ -25,13 +25,13 @@ from interpose.models.base import (  # noqa: E402
     COUNT,
     FEET,
     Answer,
+    Around,
     Base,
     BaseConfig,
     Motion,
     complete_columns,
     room,
 )
-from interpose.models.keys import neighbours  # noqa: E402
 from interpose.observation import Gap, Observation  # noqa: E402
 from interpose.skeletons import JOINTS, PARENTS, find_mapping  # noqa: E402
 from interpose.training import export, graphs  # noqa: E402
@@ -134,22 +134,22 @@ def test_the_starting_point_goes_on_as_the_motion_does():
     known = torch.ones(1, 30, dtype=torch.bool)
     known[:, 10:20] = False
     line = 2.0 + 0.3 * time
-    far = torch.full((1,), 1e9, dtype=torch.float64)
-    assert torch.allclose(complete_columns(line, known, *neighbours(known), far), line)
+    slow, soon = (torch.full((1, 1), rate, dtype=torch.float64) for rate in (1e-9, 0.5))
+    around = Around.of(known, torch.float64)
+    assert torch.allclose(complete_columns(line, known, around, slow), line)
     cubic = 0.001 * (time - 14.5) ** 3
-    off = (complete_columns(cubic, known, *neighbours(known), far) - cubic).abs().max()
-    straight = (complete_columns(cubic, known, *neighbours(known), None) - cubic).abs().max()
+    off = (complete_columns(cubic, known, around, slow) - cubic).abs().max()
+    straight = (complete_columns(cubic, known, around, None) - cubic).abs().max()
     assert off < 0.4 * straight
     known[:, 10:] = False
-    soon = torch.full((1,), 2.0, dtype=torch.float64)
-    on = complete_columns(line, known, *neighbours(known), soon)[0, 9:, 0].diff()
+    on = complete_columns(line, known, Around.of(known, torch.float64), soon)[0, 9:, 0].diff()
     assert on[0] > 0
     assert on[-1].abs() < 1e-3
 
 
 def test_there_is_no_room_at_known_frames_and_all_of_it_far_away():
     known = torch.tensor([[1, 1, 0, 0, 0, 1, 0, 0], [1, 0, 1, 1, 1, 1, 1, 1], [0] * 8, [0.5] * 8])
-    gap, short, nothing, noisy = room(known, *neighbours(known > 0))
+    gap, short, nothing, noisy = room(known, Around.of(known > 0, torch.float32))
     assert (gap[known[0] == 1] == 0).all()
     assert gap[3] > gap[2] == gap[4] > short[1] > 0
     assert gap[7] > gap[6] > gap[2]

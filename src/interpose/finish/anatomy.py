@@ -53,7 +53,7 @@ def knees(turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     turned: (F, 22, 4) canonical rotations.
     """
     thighs, shins = (turned[:, list(rows)] for rows in zip(*LEGS))
-    bend = rotations.multiply(rotations.conjugate(thighs), shins)
+    bend = rotations.relative(thighs, shins)
     twist = rotations.angle(rotations.twist_about(bend, UP.values), rotations.identity())
     way = rotations.rotate(bend, -UP.values)
     return np.degrees(twist), np.degrees(np.arctan2(-way[..., 2], -way[..., 1]))
@@ -114,7 +114,7 @@ def straightened(opinion: Clip, known: Observation) -> Clip:
     for column, (_, shin) in enumerate(LEGS):
         thigh = turned[:, LEGS[column][0]]
         back = rotations.multiply(thigh, rotations.about("X", np.radians(more[:, column])))
-        inner = rotations.multiply(rotations.conjugate(thigh), turned[:, shin])
+        inner = rotations.relative(thigh, turned[:, shin])
         turned[:, shin] = rotations.multiply(back, inner)
     done = body.to_clip(turned, body.root(opinion), opinion)
     return opinion.with_motion(

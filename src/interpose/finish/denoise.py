@@ -296,9 +296,7 @@ def _calm_turns(clip: Clip, moves: np.ndarray, strength: float) -> Clip:
         if moves[joint]:
             signal = rotations.continuous((own if to_parent[joint] else turned)[:, [joint]])
             calm = rotations.normalize(_calm(signal, clip.fps, strength)[:, 0])
-            local[:, joint] = (
-                calm if to_parent[joint] else rotations.multiply(rotations.conjugate(above), calm)
-            )
+            local[:, joint] = calm if to_parent[joint] else rotations.relative(above, calm)
         world[:, joint] = rotations.multiply(above, local[:, joint])
     return clip.with_motion(local, clip.translation)
 

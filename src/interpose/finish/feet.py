@@ -544,7 +544,7 @@ def reach(
         # In the world the joint turns by `turn` and its parent by `above`: the rest is its own.
         parent = rotations.multiply(above, turned[:, skeleton.parents[joint]])
         turn_here = rotations.multiply(turn, turned[:, joint])
-        done[:, joint] = rotations.normalize(rotations.multiply(rotations.conjugate(parent), turn_here))
+        done[:, joint] = rotations.normalize(rotations.relative(parent, turn_here))
         above = turn
     return done
 

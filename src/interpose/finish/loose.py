@@ -61,7 +61,7 @@ class Layer:
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
         """The body with the joints on it."""
-        off = rotations.multiply(rotations.conjugate(self.body.rotation), clip.rotation)
+        off = rotations.relative(self.body.rotation, clip.rotation)
         off = np.where(self.joints[..., None], off, [1.0, 0.0, 0.0, 0.0])
         # Nothing is to be added where the whole pose is known, nor to joints that are never loose.
         known = self.joints | observation.frames[:, None] | ~self.joints.any(axis=0)
@@ -84,6 +84,6 @@ def _turned(own: Clip, body: Clip, known: np.ndarray) -> Clip:
     vectors, there = (some[frames][:, below] - some[frames][:, [hips]] for some in (places, wanted))
     facing = rotations.multiply(rotations.fit(vectors, there), turned[frames, hips])
     if (parent := skeleton.parents[hips]) >= 0:
-        facing = rotations.multiply(rotations.conjugate(turned[frames, parent]), facing)
+        facing = rotations.relative(turned[frames, parent], facing)
     rotation[frames, hips] = facing
     return own.with_motion(rotation, own.translation)

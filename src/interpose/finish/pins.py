@@ -309,7 +309,7 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges, clip.fps))
     done, parent = rotations.multiply(change, turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
-        done = rotations.multiply(rotations.conjugate(turned[:, parent]), done)
+        done = rotations.relative(turned[:, parent], done)
     rotation = clip.rotation.copy()
     rotation[:, joint] = np.where(known.rotation[:, joint, None], rotation[:, joint], done)
     return clip.with_motion(rotation, clip.translation)

@@ -15,8 +15,8 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.finish import measures
 from interpose.finish.solve import refine
-from interpose.geometry import rotations
-from interpose.geometry.time import runs
+from interpose.geometry.time import ease, runs
+from interpose.geometry.values import moved, offset
 from interpose.observation import Observation
 
 # Seconds over which a difference in value, and one in velocity, fade into a gap. A slope fades sooner: over a
@@ -116,7 +116,7 @@ class Fade:
         x, y = (np.clip(distance / window, 0, 1)[:, None, None] for window in (wide, tight))
         slope = self.slope / (1 - 1 / tight) ** 2 if self.at_first else self.slope
         # The two cubic Hermite functions that start with value 1 and with slope 1.
-        return (2 * x**3 - 3 * x**2 + 1) * self.value + (y**3 - 2 * y**2 + y) * tight * slope
+        return (1 - ease(x)) * self.value + (y**3 - 2 * y**2 + y) * tight * slope
 
 
 def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Clip:
@@ -229,14 +229,14 @@ Measure = Callable[[Values, list[int], int, int], Fade]
 def _add(motion: Clip, known: Observation, span: tuple[int, int], measure: Measure) -> Clip:
     """The motion with a fade added at both ends of every run in the span."""
 
-    def moved(of: Clip | Observation) -> np.ndarray:
+    def shifted(of: Clip | Observation) -> np.ndarray:
         return of.translation if isinstance(of, Clip) else of.translation[:, list(motion.translated)]
 
     def turned(of: Clip | Observation) -> np.ndarray:
         return of.rotation
 
     done = []
-    for values in (turned, moved):
+    for values in (turned, shifted):
         result = values(motion).copy()
         for (start, stop), slots in _shared(values(known), span).items():
             added = np.zeros((stop - start, len(slots), 3))
@@ -245,9 +245,7 @@ def _add(motion: Clip, known: Observation, span: tuple[int, int], measure: Measu
                     distance = (np.arange(start, stop) - edge) * way
                     added += measure(values, slots, edge, way).at(distance, stop - start + 1, motion.fps)
             part = result[start:stop, slots]
-            result[start:stop, slots] = (
-                part + added if values is moved else rotations.multiply(part, rotations.exp(added))
-            )
+            result[start:stop, slots] = moved(part, added)
         done.append(result)
     return motion.with_motion(*done)
 
@@ -263,13 +261,6 @@ def _shared(known: np.ndarray, span: tuple[int, int]) -> dict[tuple[int, int], l
         for start, stop in runs(~known[slice(*span), column]):
             found.setdefault((start + span[0], stop + span[0]), []).append(column)
     return found
-
-
-def offset(raw: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """How observed values differ from raw ones: (..., 3) from quaternions (..., 4) or vectors (..., 3)."""
-    if raw.shape[-1] == 3:
-        return base - raw
-    return rotations.log(rotations.multiply(rotations.conjugate(raw), base))
 
 
 def difference(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> tuple[float, float]:

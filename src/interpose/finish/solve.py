@@ -169,7 +169,7 @@ def _aim(clip: Clip, observation: Observation, target: dict[int, np.ndarray]) ->
             turn = rotations.multiply(twist, turn)
         done = rotations.normalize(rotations.multiply(turn, turned[:, joint]))
         turned[:, joint] = np.where(free[:, None], done, turned[:, joint])
-        local = done if parent < 0 else rotations.multiply(rotations.conjugate(turned[:, parent]), done)
+        local = done if parent < 0 else rotations.relative(turned[:, parent], done)
         rotation[:, joint] = np.where(free[:, None], local, rotation[:, joint])
     return clip.with_motion(rotation, clip.translation)
 

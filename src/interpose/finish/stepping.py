@@ -22,6 +22,7 @@ from interpose.clip import Clip
 from interpose.finish import feet, measures
 from interpose.finish.windows import envelope, ramp, spread
 from interpose.geometry import rotations
+from interpose.geometry.time import ease
 from interpose.observation import Observation
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, moved, place_of
@@ -209,7 +210,7 @@ def _evenly(clip: Clip, known: Observation, angle: float, span: tuple[int, int])
         frames * 2 * rate * on / (rate + on) if rate * on > 0 else 0.0
         for on in (_rate(clip, known, start - 1, -1), _rate(clip, known, stop, 1))
     )
-    way = angle * share**2 * (3 - 2 * share) + share * (1 - share) * (leave * (1 - share) - meet * share)
+    way = angle * ease(share) + share * (1 - share) * (leave * (1 - share) - meet * share)
     return (heading[0] + way - heading)[1:-1]
 
 

@@ -80,7 +80,7 @@ def global_rotations(local: Array, parents: tuple[int, ...]) -> Array:
 def local_rotations(globals_: Array, parents: tuple[int, ...]) -> Array:
     """Global quaternions (..., J, 4) back to local ones: the inverse of `global_rotations`."""
     plan = _plan(parents)
-    turned = rotations.multiply(rotations.conjugate(_take(globals_, plan.parents)), globals_)
+    turned = rotations.relative(_take(globals_, plan.parents), globals_)
     # Sums with masks: in graphs a choice is slow.
     return plan.roots.beside(globals_) * globals_ + plan.others.beside(globals_) * turned
 

@@ -20,6 +20,7 @@ Array = Any
 AXES = "XYZ"
 
 PRODUCT = table("wxyz", "wxyz", "ww-xx-yy-zz", "wx+xw+yz-zy", "wy-xz+yw+zx", "wz+xy-yx+zw")
+RELATIVE = table("wxyz", "wxyz", "ww+xx+yy+zz", "wx-xw-yz+zy", "wy+xz-yw-zx", "wz-xy+yx-zw")
 CROSS = table("xyz", "xyz", "yz-zy", "zx-xz", "xy-yx")
 _MATRIX = [
     ["ww+xx-yy-zz", "xy+xy-wz-wz", "xz+xz+wy+wy"],
@@ -40,6 +41,8 @@ _NUMBERS, _, _SUMS = table(
     *("do-bo", "co+go", "fo+ho", "io-ao-eo"),
 )
 PRODUCTS, SQUARES = Constant(_NUMBERS.values @ _SUMS.values), Constant(np.eye(4).ravel())
+# The same for matrices whose columns, instead of their rows, stand one after the other.
+PRODUCTS_OF_COLUMNS = Constant(PRODUCTS.values.reshape(3, 3, 16).swapaxes(0, 1).reshape(9, 16))
 # Of those sixteen, whose row each is in; and sums over the rows.
 ROW, ROWS = Constant(np.arange(16) // 4), Constant(np.tile(np.eye(4), (4, 1)))
 
@@ -57,13 +60,18 @@ def identity(*shape: int, like: Array = None) -> Array:
 def normalize(q: Array) -> Array:
     """The unit vector along `q` (..., n); zero vectors stay zero."""
     xp = array_namespace(q)
-    square = xp.sum(q * q, axis=-1)
-    return q / xp.sqrt(xp.where(square > 0, square, 1.0))[..., None]
+    length = xp.linalg.vector_norm(q, axis=-1, keepdims=True)
+    return q / xp.where(length > 0, length, 1.0)
 
 
 def multiply(a: Array, b: Array) -> Array:
     """Hamilton product (..., 4): the rotation `b` followed by `a`."""
     return bilinear(a, b, PRODUCT)
+
+
+def relative(a: Array, b: Array) -> Array:
+    """`b` as seen from `a` (..., 4): the inverse of `a`, after `b`."""
+    return bilinear(a, b, RELATIVE)
 
 
 def conjugate(q: Array) -> Array:
@@ -111,7 +119,7 @@ def log(q: Array) -> Array:
 def angle(a: Array, b: Array) -> Array:
     """The angle in radians (0 to pi) between the rotations `a` and `b` (..., 4): shape (...)."""
     xp = array_namespace(a, b)
-    difference = log(multiply(conjugate(a), b))
+    difference = log(relative(a, b))
     square = xp.sum(difference * difference, axis=-1)
     # At zero the root has no slope; its gradient there is taken as zero.
     same = square == 0
@@ -132,7 +140,7 @@ def slerp(a: Array, b: Array, t: Array) -> Array:
     xp = array_namespace(a, b)
     b = alike(b, a)
     t = xp.asarray(t, dtype=a.dtype) if not hasattr(t, "dtype") else t
-    return normalize(multiply(a, exp(t[..., None] * log(multiply(conjugate(a), b)))))
+    return normalize(multiply(a, exp(t[..., None] * log(relative(a, b)))))
 
 
 def to_matrix(q: Array) -> Array:
@@ -145,14 +153,19 @@ def from_matrix(m: Array) -> Array:
 
     Of the four ways to write the quaternion the best conditioned one is taken (Shepperd 1978).
     """
-    xp = array_namespace(m)
-    rows = xp.reshape(m, (*m.shape[:-2], 9))
+    return _from_nine(array_namespace(m).reshape(m, (*m.shape[:-2], 9)), PRODUCTS)
+
+
+def _from_nine(numbers: Array, products: Constant) -> Array:
+    """As `from_matrix`, of a matrix's numbers (..., 9) in any order, and their products in that order."""
+    xp = array_namespace(numbers)
     # Four times each component times each other: any row is the quaternion, times one of its components.
-    products = xp.matmul(rows, PRODUCTS.beside(m)) + SQUARES.beside(m)
-    best = xp.argmax(products[..., ::5], axis=-1)[..., None] == ROW.beside(m)
-    q = xp.matmul(xp.astype(best, m.dtype) * products, ROWS.beside(m))
-    length = xp.sqrt(xp.sum(q * q, axis=-1))  # at least 1: the four squares are 4 together
-    return q / xp.where(q[..., 0] < 0, -length, length)[..., None]
+    every = xp.matmul(numbers, products.beside(numbers)) + SQUARES.beside(numbers)
+    best = xp.argmax(every[..., ::5], axis=-1, keepdims=True) == ROW.beside(numbers)
+    q = xp.matmul(xp.astype(best, numbers.dtype) * every, ROWS.beside(numbers))
+    # At least 1: the four squares are 4 together.
+    length = xp.linalg.vector_norm(q, axis=-1, keepdims=True)
+    return q / xp.where(q[..., :1] < 0, -length, length)
 
 
 def to_6d(q: Array) -> Array:
@@ -169,7 +182,7 @@ def from_6d(v: Array) -> Array:
     x = normalize(v[..., :3])
     second = v[..., 3:]
     y = normalize(second - xp.sum(x * second, axis=-1, keepdims=True) * x)
-    return from_matrix(xp.stack([x, y, cross(x, y)], axis=-1))
+    return _from_nine(xp.concat([x, y, cross(x, y)], axis=-1), PRODUCTS_OF_COLUMNS)
 
 
 def about(axis: str, angles: Array) -> Array:

@@ -13,6 +13,7 @@ from array_api_compat import array_namespace
 
 from interpose.errors import RequestError, is_number, unfit
 from interpose.geometry import rotations
+from interpose.geometry.values import offset
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
@@ -164,16 +165,21 @@ def hermite_rotations(
     is the interpolation of the reversed input.
     """
     share, start, stop = _hermite_terms(t, length, reach)
-    way = rotations.log(rotations.multiply(rotations.conjugate(a), b))
+    way = offset(a, b)
     line = way / length[..., None]
     base = rotations.multiply(a, rotations.exp(share * way))
     extra = rotations.exp(start * (va - line) + stop * (vb - line))
     return rotations.normalize(rotations.multiply(base, extra))
 
 
+def ease(share: Array) -> Array:
+    """Smoothly from 0 at 0 to 1 at 1, with no slope at either end."""
+    return share * share * (3 - 2 * share)
+
+
 def steps(q: Array) -> Array:
     """The turn from each frame to the next, (F, ..., 4) to rotation vectors (F - 1, ..., 3) in body axes."""
-    return rotations.log(rotations.multiply(rotations.conjugate(q[:-1]), q[1:]))
+    return offset(q[:-1], q[1:])
 
 
 def _velocities(xp: Any, differences: Array) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations, time
+from interpose.geometry.values import moved, offset
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import placed
@@ -76,7 +77,6 @@ def _above(skeleton: Skeleton, rotation: np.ndarray, joint: int) -> np.ndarray:
 
 
 Fill = Callable[[np.ndarray, Span], np.ndarray]
-Way = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def _complete(values: np.ndarray, known: np.ndarray, rest: np.ndarray, fps: float, fill: Fill) -> np.ndarray:
@@ -196,25 +196,25 @@ class Spline(_Classical):
     name = "spline"
 
     def positions(self, values: np.ndarray, span: Span) -> np.ndarray:
-        level = self._blend(values, span, _offset, time.hermite, REACH_OF_TRAVEL)
-        height = self._blend(values, span, _offset, time.hermite, REACH)
+        level = self._blend(values, span, time.hermite, REACH_OF_TRAVEL)
+        height = self._blend(values, span, time.hermite, REACH)
         return np.where([False, True, False], height, level)
 
     def offsets(self, values: np.ndarray, span: Span) -> np.ndarray:
-        return self._blend(values, span, _offset, time.hermite, REACH)
+        return self._blend(values, span, time.hermite, REACH)
 
     def rotations(self, values: np.ndarray, span: Span) -> np.ndarray:
-        return self._blend(values, span, _turn, time.hermite_rotations, REACH)
+        return self._blend(values, span, time.hermite_rotations, REACH)
 
     def _blend(
-        self, values: np.ndarray, span: Span, way: Way, hermite: Callable[..., np.ndarray], reach: float
+        self, values: np.ndarray, span: Span, hermite: Callable[..., np.ndarray], reach: float
     ) -> np.ndarray:
-        """The frames of a span; `way` is the difference between two values, `hermite` the curve."""
+        """The frames of a span; `hermite` is the curve between two values."""
         last = len(span.known) - 1
         gaps, which = np.unique(span.gap, return_inverse=True)
         start, stop = np.maximum(gaps - 1, 0), np.minimum(gaps, last)
-        va = _velocity(values, span, start, -1, way)
-        vb = _velocity(values, span, stop, 1, way)
+        va = _velocity(values, span, start, -1)
+        vb = _velocity(values, span, stop, 1)
         a, b = values[span.known[start]], values[span.known[stop]]
         length = (span.known[stop] - span.known[start]).astype(float)
         since = (span.frames - span.known[start][which])[:, None].astype(float)
@@ -230,26 +230,11 @@ class Spline(_Classical):
         left = np.maximum(1.0 - abs(since[is_open]) / rest, 0.0)
         carried = np.sign(since[is_open]) * rest / 3 * (1 - left**3)
         velocity = np.where((gaps == 0)[outer, None, None], vb[outer], va[outer])
-        filled[is_open] = _go(a[outer], carried[..., None] * velocity)
+        filled[is_open] = moved(a[outer], carried[..., None] * velocity)
         return filled
 
 
-def _offset(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """From `a` to `b` (..., 3)."""
-    return b - a
-
-
-def _turn(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """From `a` to `b` (..., 4): rotation vectors (..., 3) in the axes of `a`."""
-    return rotations.log(rotations.multiply(rotations.conjugate(a), b))
-
-
-def _go(a: np.ndarray, way: np.ndarray) -> np.ndarray:
-    """The inverse of both: where `way` (..., 3) leads from `a` (..., 3 or 4)."""
-    return a + way if a.shape[-1] == 3 else rotations.multiply(a, rotations.exp(way))
-
-
-def _velocity(values: np.ndarray, span: Span, at: np.ndarray, side: int, way: Way) -> np.ndarray:
+def _velocity(values: np.ndarray, span: Span, at: np.ndarray, side: int) -> np.ndarray:
     """Velocities a frame (g, n, 3) at the observed frames number `at` (g,), from those before or after.
 
     Args:
@@ -269,7 +254,7 @@ def _velocity(values: np.ndarray, span: Span, at: np.ndarray, side: int, way: Wa
     def difference(i: np.ndarray, j: np.ndarray) -> np.ndarray:
         i, j = np.minimum(i, j), np.maximum(i, j)
         lapse = np.maximum(known[j] - known[i], 1)
-        return way(values[known[i]], values[known[j]]) / lapse[:, None, None]
+        return offset(values[known[i]], values[known[j]]) / lapse[:, None, None]
 
     def step(count: np.ndarray) -> np.ndarray:
         return np.clip(at + side * count, 0, last)

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from interpose.geometry import rotations
-from interpose.geometry.time import runs
+from interpose.geometry.time import ease, runs
+from interpose.geometry.values import moved, offset
 
 # Seconds in which a step fades.
 FADE = 0.3
@@ -34,30 +34,18 @@ def joined(values: np.ndarray, known: np.ndarray, changes: np.ndarray, fps: floa
         for start, stop in runs(~known[:, column]):
             said, added = values[start:stop, column], np.zeros((stop - start, 3))
             for change in alone[(alone > start + 1) & (alone < stop - 1)] - start:
-                last, step, following = _steps(said[change - 2 : change + 2])
+                near = said[change - 2 : change + 2]
+                last, step, following = offset(near[:-1], near[1:])
                 room = np.array([change, stop - start - change])
                 shares = np.minimum(room, FADE * fps)
                 before, after = (_fade(frames, fps) for frames in room)
                 ways = np.concatenate([shares[0] * before[::-1], -shares[1] * after]) / shares.sum()
                 added += ways[:, None] * (step - (last + following) / 2)
-            done[start:stop, column] = _plus(said, added)
+            done[start:stop, column] = moved(said, added)
     return done
-
-
-def _steps(values: np.ndarray) -> np.ndarray:
-    """(k - 1, 3) from each of k values to the next."""
-    if values.shape[-1] == 3:
-        return np.diff(values, axis=0)
-    return rotations.log(rotations.multiply(rotations.conjugate(values[:-1]), values[1:]))
-
-
-def _plus(values: np.ndarray, added: np.ndarray) -> np.ndarray:
-    if values.shape[-1] == 3:
-        return values + added
-    return rotations.multiply(values, rotations.exp(added))
 
 
 def _fade(room: int, fps: float) -> np.ndarray:
     """(room,) from one to zero, smoothly."""
     x = np.minimum(np.arange(room) / min(room, FADE * fps), 1.0)
-    return 2 * x**3 - 3 * x**2 + 1
+    return 1 - ease(x)

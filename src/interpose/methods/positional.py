@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.geometry.time import grid, sample, sample_smooth
+from interpose.geometry.time import ease, grid, sample, sample_smooth
 from interpose.methods import weights
 from interpose.methods.bodies import no_humanoid, observed_body
 from interpose.methods.classical import Spline
@@ -74,7 +74,7 @@ def handover(seen: np.ndarray, frames: int) -> np.ndarray:
     last = np.maximum.accumulate(np.where(seen, frame, -frames), axis=0)
     first = np.minimum.accumulate(np.where(seen, frame, len(seen) + frames)[::-1], axis=0)[::-1]
     x = np.clip(np.minimum(frame - last, first - frame) / frames, 0.0, 1.0)
-    return x * x * (3 - 2 * x)
+    return ease(x)
 
 
 def speak(clip: Clip, observation: Observation, card: weights.Card, network: Network, over: int) -> Raw:

@@ -34,8 +34,10 @@ VELOCITY = 10.0  # what velocities (m or matrix entries a frame) are multiplied 
 # and great arcs in gaps of 5, 15, 30 and 45 frames: what a network says that has learned nothing, by
 # `interpose train base --out runs/begin --set datasets=lafan1 --budget 1steps`.
 REACH_TURN, REACH_WAY = 20.0, 45.0
-REACH = Constant([REACH_TURN] * COUNT + [REACH_WAY])
+RATE = Constant(1 / np.array([REACH_TURN] * COUNT + [REACH_WAY])[:, None])
 REST = Constant([1.0, 0.0, 0.0, 0.0, 1.0, 0.0])  # columns of a joint that stands as in the T-pose
+# What is never known: joints stand so, and the hips are at 0.
+NEVER = Constant(np.append(np.tile(REST.values, (COUNT, 1)), np.zeros((1, 6)), axis=0))
 # Rows times the cosine of the first, the sine of the second and the third are turned about Y.
 FLAT, UP = Constant(np.diag([1.0, 0.0, 1.0])), Constant(np.diag([0.0, 1.0, 0.0]))
 QUARTER = Constant([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
@@ -45,6 +47,7 @@ SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
 
 # Numbers that it says of a frame: columns of rotations, hips, contacts of the feet, and the risk.
 SAID = [6 * COUNT, 3, len(FEET), 1]
+PARTS = [slice(stop - size, stop) for size, stop in zip(SAID, np.cumsum(SAID).tolist())]
 NEAR = 4.0  # frames from known ones at which half of what is said is added
 LENGTH = 5.0  # what lengths of bones (m) are multiplied with
 
@@ -105,51 +108,76 @@ class Motion:
         return kinematics.forward(self.local, torch.cat([self.root[:, :, None], move], dim=2), PARENTS)
 
 
-def complete_columns(
-    values: Tensor, known: Tensor, last: Tensor, first: Tensor, reach: Tensor | None
-) -> Tensor:
-    """Values (N, T, n) of known frames (N, T); in between a line that is left and met at their velocities.
+@dataclass
+class Around:
+    """The known frames around each, (..., T).
 
-    `last` and `first` (N, T) are the known `neighbours` of each frame.
-
-    A cubic of Hermite in which what the velocities differ from the line by dies away within `reach` (n)
-    frames, so that long gaps do not swing out. Next to a lone known frame, and without `reach`, there is no
-    velocity but the line's. At open ends the value is held, after its velocity has died away.
+    Attributes:
+        last, first: their indices, as of `neighbours`.
+        since, until: how many frames they are away, as floats; 0 where there is none.
+        length: how many frames they are apart; 0 at open ends.
     """
-    frame = torch.arange(values.shape[1], device=values.device)
-    since, until = (d.clamp(min=0).to(values.dtype) for d in (frame - last, first - frame))
-    length = (first - last).to(values.dtype)
-    share = torch.where(length > 0, since / length.clamp(min=1.0), (until > 0).to(values.dtype))
+
+    last: Tensor
+    first: Tensor
+    since: Tensor
+    until: Tensor
+    length: Tensor
+
+    @classmethod
+    def of(cls, known: Tensor, kind: torch.dtype) -> Around:
+        """Of values of which the frames (..., T) are known."""
+        last, first = neighbours(known)
+        frame = torch.arange(known.shape[-1], device=known.device)
+        since, until, length = (d.to(kind) for d in (frame - last, first - frame, first - last))
+        return cls(last, first, since.clamp(min=0), until.clamp(min=0), length)
+
+    def some(self, part: int | slice) -> Around:
+        """Of some of the values (B, n, T)."""
+        every = (self.last, self.first, self.since, self.until, self.length)
+        return Around(*(one[:, part] for one in every))
+
+
+def complete_columns(values: Tensor, known: Tensor, around: Around, rate: Tensor | None) -> Tensor:
+    """Values (..., T, n) of known frames (..., T); between, a line that is left and met at their velocities.
+
+    A cubic of Hermite in which what the velocities differ from the line by dies away at some `rate` (...,
+    1) a frame, so that long gaps do not swing out. Next to a lone known frame, and without a rate, there is
+    no velocity but the line's. At open ends the value is held, after its velocity has died away.
+    """
+    since, until, length = around.since, around.until, around.length.clamp(min=1.0)
+    share = torch.where(around.length > 0, since / length, until.clamp(max=1.0))
     held = known.to(values.dtype)
-    both = (held[:, 1:] * held[:, :-1])[..., None]
-    steps = torch.cat([both * (values[:, 1:] - values[:, :-1]), both], dim=2)
+    both = (held[..., 1:] * held[..., :-1])[..., None]
+    steps = torch.cat([both * values.diff(dim=-2), both], dim=-1)
     # Values, the step to or from the frame beside, and whether that is known, too.
-    size, pad = values.shape[2], nn.functional.pad
-    here = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=2), last)
-    there = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=2), first)
+    size, pad = values.shape[-1], nn.functional.pad
+    here = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=-1), around.last)
+    there = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=-1), around.first)
     a, b = here[..., :size], there[..., :size]
-    if reach is None:
+    if rate is None:
         return a + share[..., None] * (b - a)
     # How far each velocity carries, and how much less of the line's way that leaves.
-    leave = here[..., -1] * since * (1 - share) * (1 - share) * torch.exp(-since / reach)
-    meet = there[..., -1] * until * share * share * torch.exp(-until / reach)
-    share = share + (meet - leave) / length.clamp(min=1.0)
+    left = 1 - share
+    leave = here[..., -1] * since * left * left * torch.exp(-rate * since)
+    meet = there[..., -1] * until * share * share * torch.exp(-rate * until)
+    share = share + (meet - leave) / length
     before, after = here[..., size:-1], there[..., size:-1]
     return a + share[..., None] * (b - a) + leave[..., None] * before - meet[..., None] * after
 
 
-def room(known: Tensor, last: Tensor, first: Tensor) -> Tensor:
+def room(known: Tensor, around: Around) -> Tensor:
     """How much may be added to the starting point: 0 at frames (..., T) that are known exactly, to 1 far
-    away; `last` and `first` are the `neighbours` of each that are known at all.
+    away; `around` each are those that are known at all.
 
     The starting point is as good as its neighbours are near: so the network, whose answers are all of about
     one size, need not learn to keep still beside them. What is noisy may always change.
     """
     held = known > 0
-    frame = torch.arange(known.shape[-1], device=known.device)
-    since, until = (d.clamp(min=0).to(known.dtype) for d in (frame - last, first - frame))
     # Between two known frames half their harmonic mean, at open ends the distance to the only one.
-    away = torch.where(first > last, since * until / (since + until).clamp(min=1.0), since + until)
+    both = around.since + around.until
+    between = around.since * around.until / around.length.clamp(min=1.0)
+    away = torch.where(around.length > 0, between, both)
     share = torch.where(held.any(dim=-1, keepdim=True), away / (away + NEAR), 1.0)
     return torch.where(held & (known < 1), 0.5, share)
 
@@ -175,11 +203,12 @@ class Block(nn.Module):
     def forward(self, x: Tensor, bias: Tensor | None, batch: int) -> Tensor:
         """x: (B T, width): of rows graphs add biases as they multiply; bias: (heads, T, T), added to how much
         frames attend to each other; batch: B."""
-        asked = self.ask(self.norms[0](x)).unflatten(1, (3, self.heads, -1)).unflatten(0, (batch, -1))
-        query, key, value = asked.permute(2, 0, 3, 1, 4).unbind(0)
+        asked = self.ask(self.norms[0](x)).view(batch, -1, 3 * self.heads, x.shape[1] // self.heads)
+        asked = asked.transpose(1, 2)
+        query, key, value = (asked[:, i * self.heads : (i + 1) * self.heads] for i in range(3))
         score = (query / math.sqrt(query.shape[-1])) @ key.transpose(2, 3)
         weight = torch.softmax(score if bias is None else score + bias.to(score.dtype), dim=-1)
-        told = (weight @ value).transpose(1, 2).flatten(2).flatten(0, 1)
+        told = (weight @ value).transpose(1, 2).reshape(-1, x.shape[1])
         x = x + self.dropout(self.say(told))
         deep = nn.functional.gelu(self.inner(self.norms[1](x)))
         return x + self.dropout(self.outer(deep))
@@ -195,8 +224,8 @@ class Start:
         origin: (B, 3), of the pose that all is seen from.
         away, back: (B, 3, 3), what turns rows into its heading, and back.
         columns: (B, T, 22, 6) global rotations, as seen from there.
-        last, first: (B, 25, T) the known frames around each: of the 23 values that may be known, of the hips'
-            rotation and place together, and of all of them together.
+        around: (B, 23, T) the known frames around each, of all values that may be known.
+        whole: (B, T), of all of them together.
     """
 
     motion: Motion
@@ -206,8 +235,8 @@ class Start:
     away: Tensor
     back: Tensor
     columns: Tensor
-    last: Tensor
-    first: Tensor
+    around: Around
+    whole: Around
 
 
 @dataclass
@@ -243,12 +272,14 @@ class Encoder(nn.Module):
         nn.init.zeros_(self.label.weight)
 
     def forward(self, seen: Tensor, label: Tensor, bones: Tensor) -> Tensor:
-        x = self.see(seen) + (self.body(LENGTH * bones.flatten(1)) + self.label(label))[:, None]
+        batch = seen.shape[0]  # len() would be a constant in graphs
+        body = self.body(LENGTH * bones.flatten(1)) + self.label(label)
+        x = self.see(seen.flatten(0, 1)).unflatten(0, (batch, -1)) + body[:, None]
         bias = None
         if self.apart is not None:
             frame = torch.arange(seen.shape[1], device=x.device)
             bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
-        batch, x = x.shape[0], x.flatten(0, 1)  # len() would be a constant in graphs
+        x = x.flatten(0, 1)
         for block in self.blocks:
             x = block(x, bias, batch)
         said: Tensor = self.say(self.norm(x)).unflatten(0, (batch, -1))
@@ -303,55 +334,48 @@ class Base(nn.Module):
 
     def start(self, local: Tensor, root: Tensor, known: Tensor, bones: Tensor) -> Start:
         """The classical completion of what is known; arguments as in `complete`."""
-        batch, count = local.shape[:2]
+        count = local.shape[1]
         held = known > 0
         columns = torch.cat([rotations.to_6d(local), nn.functional.pad(root, (0, 3))[:, :, None]], dim=2)
-        columns = held.to(columns.dtype)[..., None] * columns
-        flat = columns.transpose(1, 2).flatten(0, 1)
         whole = held.all(dim=2)
         placed_hips = held[..., 0] & held[..., COUNT]
-        asked = torch.cat([held.transpose(1, 2), placed_hips[:, None], whole[:, None]], dim=1)
-        last, first = (found.unflatten(0, (batch, -1)) for found in neighbours(asked.flatten(0, 1)))
-        reach = REACH.beside(flat).repeat(batch)[:, None] if self.config.velocities else None
-        before, after = (around[:, : COUNT + 1].flatten(0, 1) for around in (last, first))
-        done = complete_columns(flat, held.transpose(1, 2).flatten(0, 1), before, after, reach)
-        done = done.unflatten(0, (batch, COUNT + 1)).transpose(1, 2)
-        # Joints that are never known stand as in the T-pose.
-        never = ~held[:, :, :COUNT].any(dim=1, keepdim=True)[..., None]
-        turned = rotations.from_6d(torch.where(never, REST.beside(done), done[:, :, :COUNT]))
-        turned = torch.where(held[:, :, :COUNT, None], local, turned)
-        motion = Motion(turned, done[:, :, COUNT, :3])
+        known_values = held.transpose(1, 2)
+        asked = torch.cat([known_values, placed_hips[:, None], whole[:, None]], dim=1)
+        every = Around.of(asked, columns.dtype)
+        around = every.some(slice(COUNT + 1))
+        rate = RATE.beside(columns) if self.config.velocities else None
+        done = complete_columns(columns.transpose(1, 2), known_values, around, rate).transpose(1, 2)
+        done = torch.where(held.any(dim=1)[:, None, :, None], done, NEVER.beside(done))
+        motion = Motion(rotations.from_6d(done[:, :, :COUNT]), done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
         if self.config.near:
             frame = torch.arange(count, device=held.device)
             missing = torch.where(whole, count - 1, frame).amin(dim=1, keepdim=True)
-            at = last[:, -2].gather(1, missing)
+            at = every.last[:, COUNT + 1].gather(1, missing)
         else:
-            at = torch.zeros(batch, 1, dtype=torch.long, device=held.device)
+            at = torch.zeros_like(every.last[:, COUNT + 1, :1])
         pose = pick(placed.flatten(2), at).unflatten(2, (COUNT, 3))[:, 0]
         origin = pose[:, 0] * FLOOR.beside(pose)
         yaw = facing(pose)[:, None, None]
         back = torch.cos(yaw) * FLAT.beside(pose) + torch.sin(yaw) * QUARTER.beside(pose) + UP.beside(pose)
         away = back.transpose(1, 2)
         columns = turned_by(rotations.to_6d(globals_), away)
-        return Start(motion, globals_, placed, origin, away, back, columns, last, first)
+        return Start(motion, globals_, placed, origin, away, back, columns, around, every.some(COUNT + 2))
 
     def features(self, start: Start, known: Tensor, pinned: Tensor, pins: Tensor) -> Tensor:
         """(B, T, SEEN): what the network sees of the starting point, from where it is seen."""
         placed = turned_by(start.placed - start.origin[:, None, None], start.away)
-        hips, around = placed[:, :, 0], placed[:, :, 1:] - placed[:, :, :1]
-        around = nn.functional.pad(around, (0, 0, 1, 0))  # the hips themselves, at 0
-        steps = [nn.functional.pad(some.diff(dim=1), (0, 0, 1, 0)) for some in (hips, around.flatten(2))]
-        there = pins.to(hips.dtype)
+        hips = placed[:, :, :1]
+        moving = torch.cat([hips, placed - hips], dim=2).flatten(2)
+        steps = nn.functional.pad(moving.diff(dim=1), (0, 0, 1, 0))
+        there = pins.to(placed.dtype)
         off = there[..., None] * turned_by(pinned - start.placed, start.away)
-        last, first = start.last[:, -1], start.first[:, -1]
-        frame = torch.arange(known.shape[1], device=known.device)
-        far = torch.stack([frame - last, first - frame], dim=-1).clamp(min=0).to(hips.dtype)
+        far = torch.stack([start.whole.since, start.whole.until], dim=-1)
         near = torch.cat([far / SECOND, 1 / (1 + far)], dim=-1)
         if not self.config.distances:
             near = torch.zeros_like(near)
-        parts = [start.columns.flatten(2), hips, around.flatten(2), *(VELOCITY * step for step in steps)]
-        parts += [known.to(hips.dtype), off.flatten(2), there, near]
+        parts = [start.columns.flatten(2), moving, VELOCITY * steps]
+        parts += [known.to(placed.dtype), off.flatten(2), there, near]
         return torch.cat(parts, dim=2)
 
     def complete(
@@ -383,15 +407,15 @@ class Base(nn.Module):
     def answer(self, start: Start, said: Tensor, local: Tensor, known: Tensor) -> Answer:
         """What is said (B, T, SAID) of the starting point, as a motion; other arguments as in `complete`."""
         config = self.config
-        columns, moved, contact, risk = said.to(start.motion.root.dtype).split(SAID, dim=2)
+        said = said.to(start.motion.root.dtype)
+        columns, moved, contact, risk = (said[..., part] for part in PARTS)
         exactly = known >= 1
         open_ = 1 - exactly.to(known.dtype)
         if config.room and config.residual:
-            last, first = start.last[:, : COUNT + 1], start.first[:, : COUNT + 1]
-            open_ = room(known.transpose(1, 2), last, first).transpose(1, 2)
+            open_ = room(known.transpose(1, 2), start.around).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
         above = kinematics.ancestors(PARENTS).beside(open_)
-        share = (above * open_[..., None, :COUNT]).amax(dim=-1)[..., None]
+        share = (above * open_[..., None, :COUNT]).amax(dim=-1, keepdim=True)
         begin = start.columns
         columns = columns.unflatten(2, (COUNT, 6))
         if not config.residual:

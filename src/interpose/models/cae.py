@@ -14,6 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from interpose.geometry.ground import turn, wrap
+from interpose.geometry.time import ease
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import JOINTS
 from interpose.skeletons.body import PAIRS, facing
@@ -162,7 +163,7 @@ def integrate(moves: Tensor, image: Image, correct: bool) -> tuple[Tensor, Tenso
     frame = torch.arange(moves.shape[1], device=moves.device)
     inside = (frame > before) & (frame < after) & correct
     share = (frame - before) / torch.where(after > before, after - before, 1)
-    ramp = torch.where(inside, share * share * (3 - 2 * share), 0.0)
+    ramp = torch.where(inside, ease(share), 0.0)
 
     def anchored(sums: Tensor, known: Tensor) -> tuple[Tensor, Tensor]:
         """Sums from the known value before, and by how much they miss the known value after."""

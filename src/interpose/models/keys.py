@@ -9,26 +9,27 @@ from torch import Tensor
 def neighbours(placed: Tensor) -> tuple[Tensor, Tensor]:
     """For each frame the last frame at or before it, and the first at or after it, that is placed.
 
-    (B, T) booleans to two (B, T) of indices. At an open end both name the only neighbour there is; where
+    (..., T) booleans to two (..., T) of indices. At an open end both name the only neighbour there is; where
     nothing is placed at all, frame 0.
     """
-    length = placed.shape[1]
-    frame = torch.arange(length, device=placed.device).expand_as(placed)
-    rank = torch.cumsum(placed.long(), dim=1)
-    count = rank[:, -1:]
-    # The k-th placed frame stands in slot k; slot 0 takes all others and is never asked for.
-    table = torch.zeros(placed.shape[0], length + 1, dtype=torch.long, device=placed.device)
-    table = table.scatter(1, torch.where(placed, rank, 0), frame)
-    last = table.gather(1, torch.minimum(torch.clamp(rank, min=1), count))
-    first = table.gather(1, torch.minimum(torch.where(placed, rank, rank + 1), count))
-    nothing = count == 0
-    return torch.where(nothing, 0, last), torch.where(nothing, 0, first)
+    length = placed.shape[-1]
+    frame = torch.arange(length, device=placed.device)
+    held = placed.long()
+    rank = torch.cumsum(held, dim=-1)
+    count = rank[..., -1:]
+    # The k-th placed frame stands in slot k; slot 0, which all others share, says frame 0.
+    table = torch.zeros((*placed.shape[:-1], length + 1), dtype=torch.long, device=placed.device)
+    table = table.scatter(-1, held * rank, held * frame)
+    last = table.gather(-1, torch.minimum(torch.clamp(rank, min=1), count))
+    first = table.gather(-1, torch.minimum(rank + 1 - held, count))
+    return last, first
 
 
 def pick(values: Tensor, index: Tensor) -> Tensor:
-    """Values (B, T) or (B, T, n) at frames (B, S): (B, S) or (B, S, n)."""
-    if values.ndim == 2:
-        return values.gather(1, index)
+    """Values (..., T) or (..., T, n) at frames (..., S): (..., S) or (..., S, n)."""
+    if values.ndim == index.ndim:
+        return values.gather(-1, index)
     # Whole rows of all motions one after the other: in graphs much faster than one by one.
-    row = index + values.shape[1] * torch.arange(values.shape[0], device=index.device)[:, None]
-    return values.flatten(0, 1).index_select(0, row.flatten()).unflatten(0, (values.shape[0], -1))
+    motions = torch.arange(index[..., 0].numel(), device=index.device).view(*index.shape[:-1], 1)
+    row = index + values.shape[-2] * motions
+    return values.flatten(0, -2).index_select(0, row.flatten()).unflatten(0, index.shape)

@@ -42,7 +42,7 @@ def to_values(rotation: Tensor) -> Tensor:
 
     That of the hips is without their heading.
     """
-    upright = rotations.multiply(rotations.conjugate(_heading(rotation)), rotation)
+    upright = rotations.relative(_heading(rotation), rotation)
     values = rotations.log(kinematics.local_rotations(upright, PARENTS)).flatten(-2)
     return torch.cat([values[..., :1], values[..., 2:]], dim=-1)
 

@@ -11,7 +11,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.geometry.time import runs, sample, sample_rotations
+from interpose.geometry.time import ease, runs, sample, sample_rotations
 from interpose.observation.corruption import LIMBS
 from interpose.observation.observation import Observation
 from interpose.skeletons import SIDES, find_mapping
@@ -312,7 +312,7 @@ def _hops(values: np.ndarray, far: float, hops: list[np.ndarray]) -> tuple[np.nd
         share = (np.arange(1, count + 1) / (count + 1))[:, None, None]
         before, after = values[start - 1], values[start + count]
         leave, meet = (count + 1) * steps[start - 2], (count + 1) * steps[start + count]
-        led = before + share**2 * (3 - 2 * share) * (after - before)
+        led = before + ease(share) * (after - before)
         led = led + share * (1 - share) * ((1 - share) * leave - share * meet)
         led = rotations.normalize(led) if values.shape[1] == 4 else led
         frames = start + np.arange(count)[:, None]

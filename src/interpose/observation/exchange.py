@@ -88,8 +88,8 @@ class Flip:
         rotation = clip.rotation.copy()
         above = turned[:, parent] if parent >= 0 else rotations.identity(len(clip))
         flipped = [rotations.multiply(half, turned[:, joint]) for joint in (thigh, shin)]
-        rotation[:, thigh] = rotations.multiply(rotations.conjugate(above), flipped[0])
-        rotation[:, foot] = rotations.multiply(rotations.conjugate(flipped[1]), turned[:, foot])
+        rotation[:, thigh] = rotations.relative(above, flipped[0])
+        rotation[:, foot] = rotations.relative(flipped[1], turned[:, foot])
         return rotation
 
 

@@ -90,7 +90,7 @@ def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part
     for joint in tops:
         aims = rotations.multiply(between, there[:, other.index(skeleton.names[joint])])
         parent = here[:, skeleton.parents[joint]]
-        rotation[to, joint] = rotations.normalize(rotations.multiply(rotations.conjugate(parent), aims))
+        rotation[to, joint] = rotations.normalize(rotations.relative(parent, aims))
 
 
 def _check(clip: Clip, observation: Observation, part: Part) -> None:

@@ -74,9 +74,7 @@ class Layout:
     def own_rotations(self, rotation: np.ndarray) -> np.ndarray:
         """The clip's rotations (n, J, 4) about each joint's own axes: what its angles stand for."""
         turned = place.rotations_in_file(rotation, self.up)
-        return rotations.multiply(
-            rotations.multiply(rotations.conjugate(self.before), turned), rotations.conjugate(self.after)
-        )
+        return rotations.multiply(rotations.relative(self.before, turned), rotations.conjugate(self.after))
 
     def reachable(
         self, rotation: np.ndarray, turned: np.ndarray, parents: tuple[int, ...]
@@ -95,8 +93,8 @@ class Layout:
             before, after = self.before[joint], self.after[joint]
             count = int((self.rotation_columns[joint] >= 0).sum())
             if turned[:, joint].any():
-                local = rotations.multiply(rotations.conjugate(above), aims[:, joint])
-                inner = rotations.multiply(rotations.conjugate(before), local)
+                local = rotations.relative(above, aims[:, joint])
+                inner = rotations.relative(before, local)
                 inner = rotations.multiply(inner, rotations.conjugate(after))
                 euler, _ = angles.nearest(inner, self.orders[joint], count)
                 nearest = rotations.from_euler(np.radians(euler), self.orders[joint])
