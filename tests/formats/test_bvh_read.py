@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from interpose import formats
+from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats.bvh import BvhSource
 from interpose.geometry import rotations
@@ -148,9 +149,11 @@ def test_z_up(tmp_path, make_bvh, body):
     assert clip.skeleton.rest_translation[head, 1] == pytest.approx(0.4)
 
 
+@pytest.mark.parametrize("rooted", [False, True])
 @pytest.mark.parametrize("axis", ["y", "z"])
-def test_who_crawls_is_on_the_floor(tmp_path, cmu_walk, axis):
-    """The head is ahead of the feet, not above them, all the time: the floor tells what is up."""
+def test_who_crawls_is_on_the_floor(tmp_path, cmu_walk, axis, rooted):
+    """The head is ahead of the feet, not above them, all the time: the floor tells what is up. A root that
+    stays at the origin tells nothing."""
     down = rotations.about("X", np.array(np.radians(85.0)))
     facing = rotations.twist_about(cmu_walk.rotation[:, 0], np.array([0.0, 1.0, 0.0]))
     upright = rotations.multiply(rotations.conjugate(facing), cmu_walk.rotation[:, 0])
@@ -158,16 +161,27 @@ def test_who_crawls_is_on_the_floor(tmp_path, cmu_walk, axis):
     rotation[:, 0] = rotations.multiply(facing, rotations.multiply(down, upright))
     lying = replace(cmu_walk, rotation=rotation, source=None)
     translation[:, 0, 1] -= lying.positions()[..., 1].min(axis=1)
+    translation[:, 0] += [3.0, 0.0, -3.0]
     lying = replace(lying, rotation=rotation.copy(), translation=translation)
     path, written = tmp_path / "crawl.bvh", lying
     if axis == "z":
         turn = rotations.about("X", np.array(np.pi / 2))
         rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
         written = replace(lying, rotation=rotation, translation=rotations.rotate(turn, translation))
-    formats.save(written, path)
+    formats.save(below_a_root(written) if rooted else written, path)
     clip = formats.load(path)
     assert clip.source.up == axis
-    np.testing.assert_allclose(clip.positions(), lying.positions(), atol=1e-4)
+    np.testing.assert_allclose(clip.positions()[:, int(rooted) :], lying.positions(), atol=1e-4)
+
+
+def below_a_root(clip):
+    """The clip with one joint more, at the origin, from which its root hangs."""
+    old = clip.skeleton
+    bones = np.append(np.zeros((1, 3)), old.rest_translation, axis=0)
+    skeleton = Skeleton(("Reference", *old.names), (-1, *(parent + 1 for parent in old.parents)), bones)
+    turned = np.append(rotations.identity(len(clip), 1), clip.rotation, axis=1)
+    moved = np.append(np.zeros((len(clip), 1, 3)), clip.translation, axis=1)
+    return Clip(skeleton, turned, moved, clip.fps, (0, 1))
 
 
 @pytest.mark.parametrize(
@@ -217,6 +231,22 @@ def test_position_channels(tmp_path, make_bvh, body, replaces):
     forced = formats.load(path, joint_positions="add" if replaces else "replace")
     assert forced.source.positions_how == "given"
     assert not np.allclose(forced.translation[:, 2], clip.translation[:, 2], atol=0.1)
+
+
+@pytest.mark.parametrize("low", [0.15, 0.5, 1.0])
+def test_hips_below_a_root_are_where_their_channels_say_however_low(tmp_path, make_bvh, body, low):
+    """Of who crawls or lies they are far from their OFFSET; what is added to it is at zero or below."""
+    (hips, _, offset, _), *others = body
+    joints = [("Root", 0, (0, 0, 0), "xyzZXY"), (hips, 1, offset, "xyzZXY")]
+    joints += [(name, depth + 1, where, "ZXY") for name, depth, where, _ in others]
+    time, values = np.linspace(0, 1, 60)[:, None], np.zeros((60, 12 + 3 * len(others)))
+    way = np.concatenate([2 * time, 0.03 * np.sin(9 * time), -3 * time], axis=1) + low * np.array(offset)
+    for meaning, written in (("replace", way), ("add", way - offset)):
+        values[:, 6:9] = written
+        (tmp_path / "a.bvh").write_text(make_bvh(joints, values))
+        clip = formats.load(tmp_path / "a.bvh", unit=1.0, up="y")
+        assert clip.source.positions == meaning
+        np.testing.assert_allclose(clip.translation[:, 1], way, atol=1e-4)
 
 
 def test_add_by_the_letter_moves_roots_too(tmp_path, make_bvh, body):

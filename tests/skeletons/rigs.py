@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from textwrap import indent
 
 import numpy as np
 
@@ -309,6 +310,7 @@ RIG = {
     "character_creator": Rig(CHARACTER_CREATOR, ("^L_", "R_"), "a", prefix="CC_Base_"),
     "makehuman": Rig(MAKEHUMAN, (r"\.L$", ".R"), "Y"),
     "rigify": Rig(RIGIFY, (r"\.L", ".R"), "Y", prefix="DEF-"),
+    "rigify_root": Rig("\nroot" + indent(RIGIFY, "  "), (r"\.L", ".R"), "Y"),
     "daz": Rig(DAZ, ("^l(?=[A-Z])", "r"), "a"),
     "child": Rig(CHILD, ("Left", "Right"), "Z", size=0.5),
 }

@@ -30,7 +30,7 @@ from interpose.skeletons.rest import find_rest
 
 TOES = ("LeftToe", "RightToe")
 
-HEAPS = ("unreal", "vicon", "makehuman", "rigify")  # rigs whose zero pose is none
+HEAPS = ("unreal", "vicon", "makehuman", "rigify", "rigify_root")  # rigs whose zero pose is none
 
 
 def degrees(a: np.ndarray, b: np.ndarray) -> np.ndarray:

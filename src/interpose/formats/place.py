@@ -18,7 +18,7 @@ BODY = 0.9, 2.6  # metres: the extent of a body of which no legs are known
 SAMPLE = 51  # frames looked at for estimates
 # What speaks against an axis as the up axis: how far the floor under the body goes up and down, in legs (no
 # more than of stairs); a head that is not above the feet; a floor that is not at 0; another axis than Y. Of
-# 689 excerpts of all data sets, crawlers among them, 1 is misjudged, and 6 with Z up, by `examples/up.py`.
+# 691 excerpts of all data sets, crawlers among them, 1 is misjudged, and 6 with Z up, by `examples/up.py`.
 STEPS, OVERHEAD, LEVEL, UNUSUAL = 0.3, 0.3, 0.3, 0.1
 # An axis that is ahead of the next one by less is not sure; hips that stay as near to the origin, in legs,
 # tell nothing of a floor at 0.
@@ -141,8 +141,11 @@ def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
     size = mapping.leg_length
     if not size > 0:  # NaN, too
         size = max(float(np.median(length)), 1e-9)
+    # Roots and targets beside the body stay where they are, whichever way it lies.
+    known = [joint for joint in mapping.joints if joint is not None]
+    hips, places = places[:, known[0]], places[:, known]
     # Who never leaves the origin with the hips, as in animations in place, has no floor at 0.
-    level = LEVEL * (np.abs(places[:, 0]).max() > IN_PLACE * size)
+    level = LEVEL * (np.abs(hips).max() > IN_PLACE * size)
     doubts = {}
     for up, (place, sign) in _INSIDE.items():
         axis, way = place.index(1), sign[place.index(1)]

@@ -25,6 +25,8 @@ ESSENTIAL = (
     "Hips",
     *(side + part for side in ("Left", "Right") for part in ("UpLeg", "Leg", "Foot", "Arm", "ForeArm")),
 )
+# Of a thigh's length, how far a pelvis is at most from a spine that the legs hang from.
+PELVIS = 0.5
 Levers = dict[int, tuple[int, np.ndarray]]
 
 
@@ -365,7 +367,7 @@ class _Chains:
         if hips is None or chest is None:
             return {}
         if "Hips" not in limbs:
-            hips = self._pelvis(hips)
+            hips = self._pelvis(hips, limbs)
         if self.said[chest].part == "neck":
             chest = self.skeleton.parents[chest]  # Bipeds hang their collar bones off the neck
         found: dict[str, int | None] = {"Hips": hips}
@@ -396,15 +398,23 @@ class _Chains:
                     best = chain
         return best
 
-    def _pelvis(self, meeting: int) -> int:
+    def _pelvis(self, meeting: int, limbs: Found) -> int:
         """The joint that carries legs and spine: above where they meet, if the pelvis is said to be there.
 
-        Old Bipeds hang their legs off the spine, at the pelvis' own place.
+        Old Bipeds hang their legs off the spine, at the pelvis' own place. A root on the floor, from which it
+        is as far as legs are long, is no pelvis.
         """
         above = self.skeleton.parents[meeting]
-        if above in self.said and self.said[above].part == "hips" and self.said[meeting].part == "spine":
-            return above
-        return meeting
+        if above not in self.said or self.said[above].part != "hips" or self.said[meeting].part != "spine":
+            return meeting
+        shins = [limbs[name] for name in ("LeftLeg", "RightLeg") if name in limbs]
+        # The bone to the knee, from the thigh.
+        thigh = max((self._bone(joint) for joint in shins), default=np.inf)
+        return above if self._bone(meeting) < PELVIS * thigh else meeting
+
+    def _bone(self, joint: int) -> float:
+        """How far a joint is from its parent, in the skeleton's units."""
+        return float(np.linalg.norm(self.skeleton.rest_translation[joint]))
 
     def _neck(self, necks: list[int]) -> int | None:
         """The first joint of the neck that is not at the chest's own place (as it is in CMU's skeletons)."""

@@ -16,6 +16,11 @@ from interpose.formats.bvh.layout import Layout, make_layout
 from interpose.formats.bvh.motion_text import MotionText, read_text
 from interpose.skeletons import find_mapping
 
+# A share of its OFFSET: what goes further along it in a twentieth of the frames does not add to it. Hips of
+# who lies or crawls do, to .14 of their height at least in each of 1,545 excerpts of all data sets, of five
+# seconds each.
+ADDS = 0.12
+
 
 @dataclass(frozen=True, eq=False)
 class BvhSource:
@@ -78,7 +83,7 @@ def read(
         unit: metres per file unit, or one of m, cm, mm, inch, CMU; estimated from the legs when None.
         up: the axis that points up, "y", "z", "x", "-y", ...; estimated from the motion when None.
         joint_positions: "replace" or "add": whether position channels replace the OFFSET or are added to it;
-            None compares their median with the OFFSET.
+            None compares them with the OFFSET.
         roles: what is said about the joints, see `Skeleton`.
 
     Position channels of roots replace their OFFSET: in the data that people have (LAFAN1, PFNN, Autodesk and
@@ -129,7 +134,9 @@ def _joint_positions(
 ) -> tuple[str, str]:
     """Whether position channels of joints that are not roots replace the OFFSET or add to it.
 
-    Every joint votes for what its median is nearer to: its OFFSET, or zero.
+    Every joint votes, by where it is along the axis on which its OFFSET is largest, beside how far it goes
+    there: it adds if it stays at zero and below. Hips below a root travel, and are low where people crawl,
+    but not as low as that.
     """
     padded = np.concatenate([sample, np.zeros((len(sample), 1))], axis=1)
     votes = []
@@ -137,16 +144,17 @@ def _joint_positions(
         if nodes[joint].parent < 0:
             continue
         offset = np.where(columns >= 0, nodes[joint].offset, 0.0)
-        median = np.median(padded[:, columns], axis=0)
-        if np.linalg.norm(offset) > 1e-6:
-            votes.append(bool(np.linalg.norm(median - offset) <= np.linalg.norm(median)))
+        values, size = padded[:, columns], np.abs(offset).max()
+        if size > 1e-6:
+            axis = np.argmax(np.abs(offset) / (values.std(axis=0) + 0.1 * size))
+            votes.append(bool(np.percentile(values[:, axis] / offset[axis], 95) > ADDS))
     if all(nodes[joint].parent < 0 for joint in layout.translated):
         return "none", ""
     if given:
         return given, "given"
     if 2 * sum(votes) >= len(votes):
-        return "replace", "as their median is the OFFSET"
-    return "add", "as their median is zero"
+        return "replace", "as they are about the OFFSET"
+    return "add", "as they are about zero"
 
 
 def _keep_roots(layout: Layout, nodes: tuple[Node, ...], given: str | None) -> Layout:
