@@ -35,7 +35,7 @@ def gap_report(
     skeleton = finished.skeleton
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
-    after = jumps.beside(finished, known, gap, bounds)
+    after, within = (of(finished, known, gap, bounds) for of in (jumps.beside, jumps.inside))
     alive = None if gap.joints is not None else notes.liveliness(finished, gap)
     glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
@@ -54,8 +54,8 @@ def gap_report(
         seam_before=_centi(before[0] if before else None),
         seam_after=_centi(after[0] if after else None),
         seam_limit=_centi(after[1] if after else None),
-        peak=_centi(jumps.largest(finished, known, np.arange(gap.start, gap.stop))),
-        peak_limit=_centi(bounds.peak if bounds else None),
+        peak=_centi(within[0] if within else None),
+        peak_limit=_centi(within[1] if within else None),
         bone_deviation=100 * measures.bone_deviation(part.positions(), skeleton.parents, lengths),
         foot_slide=held[0] if held else None,
         foot_slide_before=unheld[0] if unheld else None,

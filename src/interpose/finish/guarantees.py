@@ -122,7 +122,7 @@ class _Work:
         limits = seams.limits(hidden, known) if ask.limits is None else ask.limits
         self.bounds = None
         if limits is not None:
-            self.bounds = jumps.Bounds(limits, jumps.peak_limit(hidden, known, float(limits.max())))
+            self.bounds = jumps.Bounds(limits, jumps.peak_limits(hidden, known, limits))
         self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
 
     def look(self) -> None:
@@ -313,16 +313,21 @@ def _plant(
     softly as possible with those that a gap may have at most."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
     loose, seen, frames = current.slice(lo, hi), known.slice(lo, hi), np.arange(*inner)
-    slide, peak = feet.measure(loose, seen, *inner), jumps.largest(loose, seen, frames) or 0.0
+    slide = feet.measure(loose, seen, *inner)
+    before = None if bounds is None else jumps.share(loose, seen, frames, bounds.peak)
     chosen = None
     for blend in feet.BLENDS:
         held = feet.plant(loose, seen, inner, blend, None if stands is None else stands[lo:hi])
-        slides, jump = feet.measure(held, seen, *inner), jumps.largest(held, seen, frames) or 0.0
+        slides = feet.measure(held, seen, *inner)
         if slide is None or slides is None or slides[0] > slide[0]:
             break  # holding feet made them slide: it was about something else than stances
-        if bounds is None or jump <= max(bounds.peak, peak):
+        if bounds is None or before is None:
             chosen = held
-        if bounds is None or jump <= max(bounds.calm, peak):
+            break
+        jump = jumps.share(held, seen, frames, bounds.peak)
+        if jump <= max(1.0, before):
+            chosen = held
+        if jump <= max(1 / seams.OWN_PEAKS, before):
             break
     if chosen is not None:
         write(current, chosen, span.start, inner)

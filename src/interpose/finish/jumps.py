@@ -12,6 +12,7 @@ from interpose.finish.span import Span, write
 from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.observation import Gap, Observation
+from interpose.skeletons import find_mapping
 
 # Metres a second squared by which velocities may jump inside of any gap: toes of who walks do by 48, and
 # beside a gap he may have stood.
@@ -30,23 +31,29 @@ KINK = 8.0
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far velocities may jump, in metres per frame squared: at seams, by joint (J,), inside of gaps, and
-    what the observed motion itself does."""
+    """How far the velocity of each joint (J,) may jump, in metres per frame squared: at seams, and inside of
+    gaps."""
 
     seam: np.ndarray
-    peak: float
-
-    @property
-    def calm(self) -> float:
-        return self.peak / seams.OWN_PEAKS
+    peak: np.ndarray
 
 
-def largest(clip: Clip, known: Observation, frames: np.ndarray) -> float | None:
-    """The largest velocity jump at some frames, in metres per frame squared; None where there are none."""
-    frames = frames[(frames > 0) & (frames < len(clip) - 1)]
-    if frames.size == 0:
+def inside(
+    clip: Clip, known: Observation, gap: Gap, bounds: Bounds | None
+) -> tuple[float, float | None] | None:
+    """As `beside`, of the frames of a gap."""
+    frames = _inner(clip, np.arange(gap.start, gap.stop))
+    if not frames.size:
         return None
-    return float(np.linalg.norm(seams.jumps(clip, known, frames), axis=-1).max())
+    return _nearest(seams.jumps(clip, known, frames), None if bounds is None else bounds.peak)
+
+
+def share(clip: Clip, known: Observation, frames: np.ndarray, most: np.ndarray) -> float:
+    """Of what they may (J,), how far velocities jump at some frames: above 1 too far."""
+    frames = _inner(clip, frames)
+    if not frames.size:
+        return 0.0
+    return float((np.linalg.norm(seams.jumps(clip, known, frames), axis=-1) / most).max())
 
 
 def beside(
@@ -55,25 +62,38 @@ def beside(
     """The velocity jump beside a gap of the joint that comes nearest to its limit, or goes furthest beyond,
     and that limit, in metres per frame squared; of the one that jumps furthest where there are no limits
     (None). None where the gap has no seam."""
-    frames = np.array([frame for frame in (gap.start - 1, gap.stop) if 0 < frame < len(clip) - 1], int)
+    frames = _inner(clip, np.array([gap.start - 1, gap.stop]))
     if not frames.size:
         return None
-    size = np.linalg.norm(seams.seam_jumps(clip, known, frames), axis=-1)
-    limits = np.ones(size.shape[1]) if bounds is None else bounds.seam
-    row, joint = np.unravel_index((size / limits).argmax(), size.shape)
-    return float(size[row, joint]), None if bounds is None else float(limits[joint])
+    return _nearest(seams.seam_jumps(clip, known, frames), None if bounds is None else bounds.seam)
 
 
-def peak_limit(hidden: Clip, known: Observation, limit: float) -> float:
-    """How far a joint's velocity may jump inside a gap, in metres per frame squared.
+def _inner(clip: Clip, frames: np.ndarray) -> np.ndarray:
+    """Those of the frames that have both neighbours."""
+    return frames[(frames > 0) & (frames < len(clip) - 1)]
 
-    Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked. What no
-    body does is a glitch of the file, and no measure for anything.
+
+def _nearest(jumps: np.ndarray, most: np.ndarray | None) -> tuple[float, float | None]:
+    """Of jumps (n, J, 3) the one that comes nearest to what it may be (J,), and that."""
+    size = np.linalg.norm(jumps, axis=-1)
+    row, joint = np.unravel_index((size if most is None else size / most).argmax(), size.shape)
+    return float(size[row, joint]), None if most is None else float(most[joint])
+
+
+def peak_limits(hidden: Clip, known: Observation, limits: np.ndarray) -> np.ndarray:
+    """(J,) how far the velocity of each joint may jump inside a gap, in metres per frame squared; `limits`
+    (J,) is how far at seams.
+
+    Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked, of a
+    whole body, as an arm may do next what a leg did. What hangs on it, as a sword and fingers, goes its own
+    ways: further than any joint of the body, which may not for that. What no body does is a glitch of the
+    file, and no measure for anything.
     """
     own = seams.own_jumps(hidden, known)
-    own = own[own < TORN / hidden.fps**2]
-    peak = seams.OWN_PEAKS * float(own.max(initial=0.0))
-    return max(seams.PEAKS * limit, peak, SETS_OFF / hidden.fps**2)
+    largest = np.where(own < TORN / hidden.fps**2, own, 0.0).max(axis=0, initial=0.0)
+    most = np.maximum(seams.PEAKS * limits, seams.OWN_PEAKS * largest)
+    body = list(find_mapping(hidden.skeleton).mapped[1]) or slice(None)
+    return np.maximum(most, max(most[body].max(), SETS_OFF / hidden.fps**2))
 
 
 def excess(
@@ -83,13 +103,14 @@ def excess(
     words, and at which frame; words call the first frame `first`."""
     # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
     names = current.skeleton.names
-    bounds = bounds or Bounds(np.full(len(names), np.inf), TORN / current.fps**2)
+    torn = np.full(len(names), TORN / current.fps**2)
+    bounds = bounds or Bounds(np.full(len(names), np.inf), torn)
     found = [(0.0, "", span.start)]
     edges = seams.edges(known, current.translated, (span.start, span.stop))
-    inside = np.arange(max(span.start, 1), min(span.stop, len(current) - 1))
+    within = _inner(current, np.arange(span.start, span.stop))
     for frames, jumps, most, where in (
         (edges, seams.seam_jumps, bounds.seam, "at a seam"),
-        (inside, seams.jumps, np.full(len(names), bounds.peak), "inside the gap"),
+        (within, seams.jumps, bounds.peak, "inside the gap"),
     ):
         if frames.size:
             size = np.linalg.norm(jumps(current, known, frames), axis=-1)
@@ -106,14 +127,14 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
     Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
     """
     wild = min(WILD * feet.size(current.skeleton), TORN) / current.fps**2
-    most = wild if bounds is None else bounds.peak
+    most = np.full(len(current.skeleton), wild) if bounds is None else bounds.peak
     lo, hi, (start, stop) = span.around(len(current), 3)
     # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
     frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
     places = np.zeros(len(led), bool)
     while frames.size:
-        jumps = np.linalg.norm(seams.jumps(led, seen, frames), axis=-1).max(axis=1)
-        if jumps.max() <= most:
+        jumps = (np.linalg.norm(seams.jumps(led, seen, frames), axis=-1) / most).max(axis=1)
+        if jumps.max() <= 1:
             break
         led, (first, last) = _led_over(led, seen, (start, stop), int(frames[jumps.argmax()]), most)
         again = places[first:last].all()
@@ -126,10 +147,10 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
 
 
 def _led_over(
-    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: float
+    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: np.ndarray
 ) -> tuple[Clip, tuple[int, int]]:
     """The clip with a spline around the frame at which velocities jump worst, and over which frames: as few
-    of `inner` as bring the jump below `most`, or else those with which it is least."""
+    of `inner` as bring the jumps below `most` (J,), or else those with which they are least."""
     found = []
     for seconds in MENDS:
         half = max(1, round(seconds * clip.fps))
@@ -139,9 +160,9 @@ def _led_over(
         if free.all():
             break
         done = Spline().complete(clip, Observation(known.rotation | ~free, known.translation | ~free)).clip
-        jump = largest(done, known, np.arange(start - 1, stop + 1)) or 0.0
+        jump = share(done, known, np.arange(start - 1, stop + 1), most)
         found.append((jump, done, (start, stop)))
-        if jump <= most:
+        if jump <= 1:
             break
     if not found:
         return clip, (worst, worst + 1)

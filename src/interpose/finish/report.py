@@ -43,9 +43,10 @@ class GapReport:
             nearest to its limit, or goes furthest beyond, of what the method said and of what is returned.
         seam_limit: cm a frame squared, the limit of the latter: the 95th percentile of the joint's own
             velocity jumps in the clip, and at least that of all joints.
-        peak: cm a frame squared, the largest velocity jump of any joint inside the gap.
+        peak: cm a frame squared, the jump of the velocity inside the gap, of the joint nearest to its limit.
         peak_limit: cm a frame squared, what it may be: twice the largest one of the observed motion around
-            the gap, or four times the largest limit of a joint at seams, or what a person does who sets off.
+            the gap, or four times the largest limit at seams, or what a person does who sets off; of the
+            body's joints, and more for one beside them, as a sword, that goes further.
         bone_deviation: cm, largest change of a bone's length.
         foot_slide, foot_slide_before: cm a second, of the result and before the feet were held.
         foot_travel: m, length of the way of the feet.
