@@ -49,6 +49,16 @@ def test_who_is_brought_onto_a_rig_has_its_targets_on_the_feet(rigged, cmu_walk)
     assert off(interpose.retarget(cmu_walk, rigged.slice(0, 90))).max() < 1e-6
 
 
+def test_a_target_stays_on_its_foot_where_noise_is_smoothed(rigged):
+    """It was smoothed by itself, centimetres away from it."""
+    done = interpose.denoise(rigged, strength=2.0)
+    assert (done.clip.rotation != rigged.rotation).any()
+    assert off(done.clip).max() < 1e-6
+    few = interpose.denoise(rigged, frames=(60, 120), strength=2.0).clip
+    assert off(few).max() < 1e-6
+    assert few.translation[:50].tobytes() == rigged.translation[:50].tobytes()
+
+
 def test_a_target_that_is_turned_and_aside_stays_so(rigged):
     foot = rigged.skeleton.index("LeftFoot")
     tilt, way = rotations.about("X", np.array(0.7)), np.array([0.02, 0.1, -0.05])

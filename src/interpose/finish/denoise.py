@@ -28,9 +28,11 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
+from interpose.observation.timeline import joined
 from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
+from interpose.skeletons.targets import seated
 
 # How stiff smoothers may be: from one that takes out hardly anything to one that leaves parts of a minute.
 STIFF = 10.0 ** np.arange(-1.5, 7.01, 0.5)
@@ -64,6 +66,19 @@ STANCE, STRAYS = 0.05, 2.5
 TREMBLES, ALIKE = 5e-4, 3.0
 # Seconds over which the result goes over into the frames before and after a range.
 BLEND = 0.2
+
+
+def _seated(clip: Clip, done: Clip, sound: Observation, free: Observation) -> Clip:
+    """The denoised clip with targets on feet and hands where those have them in the clip.
+
+    sound, free: what is not broken, and what may change.
+    """
+    same = (done.rotation == clip.rotation).all(axis=(1, 2))
+    same &= (done.translation == clip.translation).all(axis=(1, 2))
+    both = joined(clip, [clip, done])
+    kept = same[:, None] | ~free.rotation
+    known = np.concatenate([sound.rotation & sound.translation, kept])
+    return seated(both, known, known).slice(len(clip), len(both))
 
 
 def _interpolated(clip: Clip, seen: Observation) -> Clip:
@@ -125,6 +140,7 @@ def denoised(
             rotation, translation = done.rotation.copy(), done.translation.copy()
             rotation[first:last], translation[first:last] = calm.rotation, calm.translation
             done = done.with_motion(rotation, translation)
+    done = _seated(cut, done, whole, free)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     rotation[part], translation[part] = done.rotation, done.translation
     result = clip.with_motion(rotation, translation)
