@@ -180,6 +180,22 @@ def test_debug_shows_where_an_error_comes_from(run, take, monkeypatch):
         assert done.err.endswith(plain.err)
 
 
+def test_memory_that_runs_out_is_the_machine_s_fault(run, take, monkeypatch):
+    break_loading(monkeypatch, MemoryError("Unable to allocate 745. GiB"))
+    done = run("scan", "take.bvh")
+    assert done.code == 3
+    assert "not enough memory" in three_lines(done.err)[0]
+
+
+@pytest.mark.parametrize("stream", ["1", "2"])
+def test_who_has_no_output_gets_the_result_and_the_exit_code(take, stream):
+    command = f'"$0" -m interpose fill take.bvh --gap 30:50 --method spline -o a.bvh {stream}>&-'
+    assert subprocess.run(["sh", "-c", command, sys.executable], cwd=take.parent).returncode == 0
+    assert (take.parent / "a.bvh").exists()
+    command = f'"$0" -m interpose scan nothing.bvh {stream}>&-'
+    assert subprocess.run(["sh", "-c", command, sys.executable], cwd=take.parent).returncode == 3
+
+
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch, number, code):
     """Where an interrupt raises KeyboardInterrupt, as in a terminal."""

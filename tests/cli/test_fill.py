@@ -492,6 +492,29 @@ def test_a_pin_is_in_the_file_s_own_unit_and_its_report_is_replayed(run, take):
 
 
 @pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("method", 1),
+        ("method", []),
+        ("path", [1]),
+        ("pinned", [{}]),
+        ("path", 3),
+        ("gaps", [{"method": True}]),
+    ],
+)
+def test_a_report_that_was_spoilt_is_refused(run, take, key, value):
+    assert run("fill", "take.bvh", "--gap", "60:90", "--method", "spline").code == 0
+    report = take.with_name("take.filled.json")
+    content = json.loads(report.read_text())
+    content[key] = [content["gaps"][0] | value[0]] if key == "gaps" else value
+    report.write_text(json.dumps(content))
+    done = run("fill", "take.bvh", "--gaps", report.name, "-o", "again.bvh")
+    assert done.code == 2
+    assert "cannot repeat" in done.err
+    assert not take.with_name("again.bvh").exists()
+
+
+@pytest.mark.parametrize(
     "text", ["LeftHand", "LeftHand@75", "LeftHand@75:1,2", "LeftHand@77:75:1,2,3", "75:1,2,3"]
 )
 def test_a_pin_that_cannot_be_read(run, take, text):

@@ -101,6 +101,7 @@ def test_paths(tmp_path, good):
         ("Time: 0.0333333", "Time: nan", "frame time is nan"),
         ("Time: 0.0333333", "Time: 8.33333", "a frame takes 8.33333 seconds"),
         ("Time: 0.0333333", "Time: 1e-320", "frame time is"),
+        ("Time: 0.0333333", "Time: 1e-9", "a frame takes 1e-09 seconds"),
         ("Frame Time: 0.0333333", "", "no frame time"),
     ],
 )

@@ -203,6 +203,25 @@ def test_new_file(cmu_walk, tmp_path):
     )
 
 
+@pytest.mark.parametrize("spoilt", ["far", "flat", "huge", "name"])
+def test_what_could_not_be_read_again_is_not_written(cmu_walk, tmp_path, spoilt):
+    skeleton, translation = cmu_walk.skeleton, cmu_walk.translation.copy()
+    if spoilt == "far":
+        translation[3] = 1e30
+    elif spoilt == "name":
+        skeleton = replace(skeleton, names=(*skeleton.names[:-1], "half \ud800"))
+    else:
+        size = 1e30 if spoilt == "huge" else 0.0
+        skeleton = replace(skeleton, rest_translation=size * skeleton.rest_translation)
+    clips = [replace(cmu_walk, skeleton=skeleton, translation=translation, source=None)]
+    clips += [replace(cmu_walk, translation=translation)] if spoilt == "far" else []
+    for clip in clips:
+        with pytest.raises(RequestError) as error:
+            formats.save(clip, tmp_path / "a.bvh")
+        assert len(str(error.value).splitlines()) == 3
+        assert not list(tmp_path.iterdir())
+
+
 def test_whole_or_not_at_all(cmu_walk, tmp_path, monkeypatch):
     path = tmp_path / "b.bvh"
     formats.save(cmu_walk, path)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import io
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -71,6 +73,15 @@ def test_bvh_to_npz_and_back(cmu_walk, tmp_path):
         {"fps": np.array(0.0)},
         {"fps": np.array([1.0, 2.0])},
         {"version": np.array(99)},
+        {"fps": np.array(True)},
+        {"parents": np.array([-1.0, 0.0, 1.0])},
+        {"names": np.arange(3)},
+        {"translated": np.array([0, 0])},
+        {"rotation": np.ones((5, 3, 4), complex)},
+        {"translation": np.full((5, 2, 3), 1e150)},
+        {"rest_translation": np.full((3, 3), 1e30)},
+        {"rest_scale": np.full(3, 1e300)},
+        {"rest_rotation": np.zeros((3, 4))},
     ],
 )
 def test_contradictions(tmp_path, change):
@@ -82,6 +93,21 @@ def test_contradictions(tmp_path, change):
         formats.load(tmp_path / "b.npz")
     assert caught.value.why
     assert caught.value.fix
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "shape"), [("rotation", "<f8", (10**9, 25, 4)), ("names", "<U50", (3 * 10**9,))]
+)
+def test_more_than_memory_holds_is_not_believed(tmp_path, name, kind, shape):
+    """A file of some kilobytes says that an array has hundreds of gigabytes."""
+    formats.save(some_clip(), tmp_path / "a.npz")
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(header, {"descr": kind, "fortran_order": False, "shape": shape})
+    with ZipFile(tmp_path / "a.npz") as old, ZipFile(tmp_path / "b.npz", "w") as new:
+        for part in old.namelist():
+            new.writestr(part, header.getvalue() if part == f"{name}.npy" else old.read(part))
+    with pytest.raises(FileError, match="memory"):
+        formats.load(tmp_path / "b.npz")
 
 
 def test_damaged(tmp_path):

@@ -69,7 +69,9 @@ def test_bad_entries_are_named(read, entry, why):
     assert len(str(error.value).splitlines()) == 3
 
 
-@pytest.mark.parametrize("content", ["", "{", "[1,", "{}", "3", '{"gaps": 4}', "[" * 100_000])
+@pytest.mark.parametrize(
+    "content", ["", "{", "[1,", "{}", "3", '{"gaps": 4}', "[" * 100_000, "[" + "1" * 5001 + "]"]
+)
 def test_files_without_gaps_are_refused(read, content):
     with pytest.raises(FileError, match="gaps"):
         read(content)

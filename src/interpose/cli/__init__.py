@@ -14,7 +14,7 @@ import threading
 import traceback
 import warnings
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 
 from interpose import __version__
@@ -86,6 +86,10 @@ def main(tokens: Sequence[str] | None = None) -> int:
     tokens = list(sys.argv[1:] if tokens is None else tokens)
     debug = "--debug" in tokens or os.environ.get("INTERPOSE_DEBUG", "0") not in ("", "0")
     tokens = [token for token in tokens if token != "--debug"]
+    # Daemons have none to write to, and the result counts all the same.
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w"))  # noqa: SIM115 - as long as the program runs
     # A log in a narrow encoding, as on Windows, takes any file's name; without this a result that is written
     # ended as a fault.
     if isinstance(sys.stdout, io.TextIOWrapper) and sys.stdout.errors == "strict":
@@ -140,6 +144,9 @@ def foreseen(error: Exception) -> InterposeError:
     if isinstance(error, InterposeError):
         return error
     kind = type(error).__name__
+    if isinstance(error, MemoryError):
+        fix = "Take a part of the clip, or close other programs."
+        return FileError("there is not enough memory", str(error), fix)
     if isinstance(error, OSError) and error.strerror:
         what = f"cannot use {error.filename}" if error.filename else "cannot read or write"
         fix = "Check the path, what you may do there, and whether there is room."
@@ -166,6 +173,13 @@ def _run(tokens: list[str], debug: bool) -> int:
 
 
 def _complain(error: InterposeError) -> None:
-    from interpose.cli.console import complain
+    """Say what is wrong, by the simplest means where there is no memory for others."""
+    try:
+        from interpose.cli.console import complain
 
-    complain(error)
+        complain(error)
+    except MemoryError:
+        with suppress(Exception):
+            sys.stderr.write(f"error: {error}\n")
+    except OSError:
+        pass  # nobody can be told, and the exit code says it

@@ -14,6 +14,7 @@ from interpose.cli.reading import Reading, full_names, joints_of, split_names
 from interpose.clip import Clip
 from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
+from interpose.formats.text import VALUE_LIMIT
 from interpose.observation import Gap, Part, Pin
 from interpose.observation.gapfile import is_report, read_gaps, read_json
 from interpose.observation.observation import frame_at
@@ -255,7 +256,7 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
             where[floor] = [float(number) for number in match.groups()[1:]] if match else np.nan
         except ValueError:
             where[:] = np.nan
-        if match is None or not np.isfinite(where).all():
+        if match is None or not np.abs(where).max() <= VALUE_LIMIT:
             names = " and ".join("xyz"[axis] for axis in floor)
             raise RequestError(
                 f"cannot read --path {text}",
@@ -283,7 +284,7 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
             where = np.array([np.nan])
         start = frame_of(match[2], clip) if match else 0
         stop = _until(match[3], clip) if match and match[3] else start + 1
-        if match is None or not np.isfinite(where).all() or stop <= start:
+        if match is None or not np.abs(where).max() <= VALUE_LIMIT or stop <= start:
             raise RequestError(
                 f"cannot read --pin {text}",
                 "a pin is a joint, a frame or a range, and three coordinates in the file's own unit and axes",
@@ -318,6 +319,12 @@ def _beside(report: Path, name: str) -> Path:
     return file if file.exists() or not (near := report.parent / file).exists() else near
 
 
+def _text(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{value!r} is no text")
+    return value
+
+
 def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, reading: Reading) -> Request:
     """The gaps of a report, filled and open ones as they were, each by the method named in it."""
     left = content["open"]
@@ -326,7 +333,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
     ]
     methods: dict[int, set[str]] = {}
     for entry in content["gaps"]:
-        methods.setdefault(entry["number"], set()).add(entry["method"])
+        methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
     parts = [
         part
         for one in content.get("parts", [])
@@ -342,7 +349,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
     return Request(
         [*filled, *open_gaps],
-        content["method"],
+        _text(content["method"]),
         # Long recoveries are reported in pieces, and where pieces differ the method asked for decides again.
         {number: used.pop() for number, used in methods.items() if len(used) == 1},
         sorted(methods) if left else None,
@@ -351,8 +358,8 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         f"as in {path}",
         str(content.get("action", "")),
         parts,
-        list(content.get("path", [])),
-        list(content.get("pinned", [])),
+        [_text(one) for one in content.get("path", [])],
+        [_text(one) for one in content.get("pinned", [])],
         layer=bool(content.get("layer")),
     )
 

@@ -75,8 +75,8 @@ def _blamed(method: Method) -> Iterator[None]:
     """What goes wrong within is the fault of a method: RequestError names it."""
     try:
         yield
-    except InterposeError:
-        raise
+    except (InterposeError, MemoryError, OSError):
+        raise  # no fault of its own
     except Exception as error:
         why = f"it failed with {type(error).__name__}: {error}"
         raise RequestError(

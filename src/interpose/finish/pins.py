@@ -34,6 +34,8 @@ LEAD = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
 # after those at most.
 STEP, SHORT, STILL, ROUNDS = 0.25, 0.005, 1e-6, 40
+# Rounds in which all frames together come to where they are wanted: longer steps where it is further.
+AT_MOST = 20
 # How much second differences of what is done count, squared, against metres squared, where all frames are
 # solved together; and up to how many frames are.
 STEADY, TOGETHER = 1.0, 2000
@@ -246,7 +248,7 @@ def _steadily(
     head makes room.
     """
     led, done = clip, np.zeros((len(clip), 1))
-    count = int(np.ceil(np.linalg.norm(wanted - start, axis=-1).max() / STEP))
+    count = min(AT_MOST, int(np.ceil(np.linalg.norm(wanted - start, axis=-1).max() / STEP)))
     for step, share in [*((k / count, SHARES[0]) for k in range(1, count)), *((1.0, s) for s in SHARES)]:
         weights = np.full(wanted.shape[:2], share)
         weights[:, heavy] *= FEET

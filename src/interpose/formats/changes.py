@@ -9,7 +9,8 @@ from typing import BinaryIO
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.formats.text import FrameText
+from interpose.errors import RequestError
+from interpose.formats.text import VALUE_LIMIT, FrameText
 
 NAMED = 5  # joints in a note
 # Puts the clip's frames from `start` into values (n, C), of which the first `known` are the file's own, and
@@ -26,6 +27,13 @@ def same_skeleton(mine: Skeleton, other: Skeleton) -> bool:
         and np.array_equal(mine.rest_translation, other.rest_translation)
         and np.array_equal(mine.rest_scale, other.rest_scale)
     )
+
+
+def check_values(values: np.ndarray) -> None:
+    """RequestError for numbers that no file of text is read with again."""
+    if not np.abs(values).max(initial=0.0) <= VALUE_LIMIT:
+        why = f"some of its numbers would be beyond {VALUE_LIMIT:g}, or are none"
+        raise RequestError("cannot write this motion", why, "Bring it nearer to the origin, or write .npz.")
 
 
 def write_frames(motion: FrameText, frames: int, put: Put, stream: BinaryIO, line_end: bytes) -> None:
@@ -48,6 +56,7 @@ def write_frames(motion: FrameText, frames: int, put: Put, stream: BinaryIO, lin
         fresh = put(values, known, start, previous)
         previous = values[-1].copy()
         values = np.round(values, style.decimals) + 0.0  # no negative zeros
+        check_values(values)
         # What comes out the same to the last written decimal did not change.
         fresh[:known] &= np.abs(values[:known] - old) > 0.5001 * 10.0**-style.decimals
         done = 0

@@ -16,8 +16,10 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import FileError, InterposeError
+from interpose.formats.text import VALUE_LIMIT
 
 VERSION = 1
+WHOLE = ("parents", "translated")
 SIZE_LIMIT = 4 << 30  # bytes, unpacked
 ARRAYS = (
     *("version", "names", "parents", "rest_translation", "rest_rotation", "rest_scale"),
@@ -41,30 +43,44 @@ def read(path: Path, roles: Mapping[str, str] | None = None) -> Clip:
             if int(file["version"]) != VERSION:
                 why = f"its version is {file['version']}, known is {VERSION}"
                 raise FileError(what, why, "Install a newer interpose.")
-            count = len(file["names"])
+            held = {name: file[name] for name in ARRAYS}
+            for name in ARRAYS[1:]:
+                if held[name].dtype.kind not in (
+                    "U" if name == "names" else "iu" if name in WHOLE else "fiu"
+                ):
+                    raise FileError(what, f"its {name} are of type {held[name].dtype}", again)
+            count = len(held["names"])
             skeleton = Skeleton(
-                tuple(str(name) for name in file["names"]),
-                tuple(int(parent) for parent in file["parents"]),
-                np.asarray(file["rest_translation"], float).reshape(count, 3),
-                np.asarray(file["rest_rotation"], float).reshape(count, 4),
-                np.asarray(file["rest_scale"], float).reshape(count),
+                tuple(str(name) for name in held["names"]),
+                tuple(int(parent) for parent in held["parents"]),
+                np.asarray(held["rest_translation"], float).reshape(count, 3),
+                np.asarray(held["rest_rotation"], float).reshape(count, 4),
+                np.asarray(held["rest_scale"], float).reshape(count),
                 roles or {},
             )
-            translated = tuple(int(joint) for joint in file["translated"])
-            if not set(skeleton.roots) <= set(translated) <= set(range(count)):
+            translated = tuple(int(joint) for joint in held["translated"])
+            once = len(set(translated)) == len(translated)
+            if not once or not set(skeleton.roots) <= set(translated) <= set(range(count)):
                 raise FileError(what, f"its translated joints are {translated}", again)
-            if not len(file["rotation"]):
+            if not len(held["rotation"]):
                 raise FileError(what, "its motion has no frames", again)
             rest = skeleton.rest_translation, skeleton.rest_rotation, skeleton.rest_scale
             if not all(np.isfinite(values).all() for values in rest):
                 raise FileError(what, "its skeleton has values that are no numbers", again)
-            motion = file["rotation"], file["translation"]
-            return Clip(skeleton, *motion, float(file["fps"]), translated, path.stem)
+            motion = held["rotation"], held["translation"]
+            # What is not known may be no number; what is above is damage, and would overflow later.
+            if any(np.nanmax(np.abs(values), initial=0.0) > VALUE_LIMIT for values in (*rest, *motion)):
+                raise FileError(what, f"it has values beyond {VALUE_LIMIT:g}", again)
+            if not np.linalg.norm(skeleton.rest_rotation, axis=1).all():
+                raise FileError(what, "its rest_rotation has rotations that are zero", again)
+            return Clip(skeleton, *motion, float(held["fps"]), translated, path.stem)
     except FileError:
         raise
     except InterposeError as error:
         raise FileError(what, f"{error.what}: {error.why}", again) from None
-    except (OSError, MemoryError):
+    except MemoryError:
+        raise FileError(what, "what it says that it holds does not fit into memory", again) from None
+    except OSError:
         raise
     except Exception as error:  # zipfile and NumPy raise whatever a damaged file makes them stumble over
         detail = (str(error) or type(error).__name__).splitlines()[0]

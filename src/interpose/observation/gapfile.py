@@ -38,6 +38,8 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
     except json.JSONDecodeError as error:
         why = f"line {error.lineno}, column {error.colno}: {error.msg}"
         raise FileError(f"the gaps in {path} are no JSON", why, f"Write {EXAMPLE}") from None
+    except ValueError as error:  # numbers of thousands of digits
+        raise FileError(f"the gaps in {path} are no JSON", str(error), f"Write {EXAMPLE}") from None
     except RecursionError:
         raise FileError(f"the gaps in {path} are nested too deep", "", f"Write {EXAMPLE}") from None
     entries = content.get("gaps") if isinstance(content, dict) else content

@@ -16,6 +16,7 @@ from interpose.geometry import kinematics
 # How much bones of the two sides may differ, as a share of them: real people's do. How long a limb is at
 # least, as a share of the longest reach.
 LIKE, LIMB = 0.20, 0.25
+BRANCHES = 16  # that two limbs are looked for among, the furthest-reaching ones
 FOOT = 0.08  # of the leg: a shorter segment after the ankle is no foot
 
 
@@ -43,7 +44,8 @@ class _Shape:
     def __init__(self, skeleton: Skeleton, inside: list[int]) -> None:
         bones = skeleton.rest_translation * skeleton.scale_above[:, None]
         self.placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)[1]
-        self.children = {j: [c for c in skeleton.children[j] if c in set(inside)] for j in inside}
+        within = set(inside)
+        self.children = {j: [c for c in skeleton.children[j] if c in within] for j in inside}
         self.length = np.linalg.norm(bones, axis=1)
         self.reach = np.zeros(len(skeleton))  # the way from a joint to the furthest end below it
         for joint in reversed(inside):
@@ -63,10 +65,9 @@ class _Shape:
     def pair(self, joint: int) -> list[_Limb]:
         """The two limbs of like length that branch off at a joint; empty when there are none."""
         least = LIMB * self.reach.max()
-        some = sorted(
-            (c for c in self.children[joint] if self.whole(c) > least), key=self.whole, reverse=True
-        )
-        pairs = [(self.chain(a), self.chain(b)) for i, a in enumerate(some) for b in some[i + 1 :]]
+        some = [c for c in self.children[joint] if self.whole(c) > least]
+        chains = [self.chain(c) for c in sorted(some, key=self.whole, reverse=True)[:BRANCHES]]
+        pairs = [(a, b) for i, a in enumerate(chains) for b in chains[i + 1 :]]
         best = max(pairs, key=lambda pair: self._alike(*pair), default=None)
         if best is None or (same := int(self._alike(*best)[0])) < 2:
             return []

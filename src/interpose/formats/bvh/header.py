@@ -13,6 +13,7 @@ import numpy as np
 
 from interpose.errors import FileError
 from interpose.formats.text import line_of, number
+from interpose.geometry.time import FASTEST
 
 HEADER_LIMIT = 4 << 20  # bytes: what comes before the first number of the motion
 JOINT_LIMIT = 2000  # kinematics keep a matrix (joints, joints)
@@ -110,6 +111,13 @@ def parse_header(start: bytes, name: str) -> Header:
         shown = f"the frame time is {time[1][:40].decode('latin-1')}" if time else "no frame time"
         raise FileError(
             what, f"line {line}: {shown}", 'Write "Frame Time:" and the seconds, for example 0.0333333.'
+        )
+    if 1 / seconds > FASTEST:
+        line = line_of(start, frames.end()) + 1
+        raise FileError(
+            what,
+            f"line {line}: a frame takes {seconds:g} seconds",
+            'Write "Frame Time:" and the seconds, for example 0.0333333.',
         )
     if seconds > LONGEST:
         line = line_of(start, frames.end()) + 1

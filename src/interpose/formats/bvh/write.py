@@ -11,7 +11,7 @@ from interpose.errors import RequestError
 from interpose.formats import angles, place
 from interpose.formats.bvh.header import Header
 from interpose.formats.bvh.read import BvhSource
-from interpose.formats.changes import Lost, same_skeleton, translation_of, write_frames
+from interpose.formats.changes import Lost, check_values, same_skeleton, translation_of, write_frames
 from interpose.formats.text import DECIMALS
 from interpose.geometry import rotations
 
@@ -109,13 +109,19 @@ def _put_motion(
 
 def _write_new(clip: Clip, stream: BinaryIO) -> None:
     skeleton = clip.skeleton
-    if bad := [name for name in skeleton.names if not name or UNWRITTEN & {*name}]:
+    if bad := [name for name in skeleton.names if not _fits(name)]:
         raise RequestError(
             f"cannot write a joint called {bad[0]!r} as BVH",
-            "names in it are one line, and hold no braces",
+            "names in it are one line of text, and hold no braces",
             "Rename it, or write .npz.",
         )
     offsets = skeleton.rest_translation * skeleton.scale_above[:, None] / CENTIMETRE
+    bones = np.round(offsets[[parent >= 0 for parent in skeleton.parents]], DECIMALS)
+    check_values(bones)
+    if bones.size and not bones.any():
+        raise RequestError(
+            "cannot write the skeleton as BVH", "all its bones have length zero", "Write .npz."
+        )
     order: list[int] = []  # as the hierarchy is written: children directly below their parents
     lines = ["HIERARCHY"]
     open_joints: list[int] = []
@@ -153,6 +159,12 @@ def _write_new(clip: Clip, stream: BinaryIO) -> None:
     _write_numbers(clip, order, stream)
 
 
+def _fits(name: str) -> bool:
+    """Whether BVH can hold a joint's name."""
+    lone = any("\ud800" <= letter <= "\udfff" for letter in name)  # halves of letters are no text
+    return bool(name) and not lone and not UNWRITTEN & {*name}
+
+
 def _numbers(vector: np.ndarray) -> str:
     return " ".join(f"{value:.{DECIMALS}f}" for value in np.round(vector, DECIMALS) + 0.0)
 
@@ -177,5 +189,6 @@ def _write_numbers(clip: Clip, order: list[int], stream: BinaryIO) -> None:
                 columns.append(clip.translation[part, clip.translated.index(joint)] * scale)
             columns.append(euler[:, joint])
         rows = np.round(np.concatenate(columns, axis=1), DECIMALS) + 0.0
+        check_values(rows)
         pattern = " ".join([f"%.{DECIMALS}f"] * rows.shape[1]) + "\n"
         stream.write("".join([pattern % tuple(row) for row in rows.tolist()]).encode())
