@@ -150,6 +150,23 @@ def test_names_of_another_language_are_found_by_shape_with_the_whole_trunk(cmu_w
     assert not odd
 
 
+def test_a_pelvis_beside_the_spine_is_found_by_shape(cmu_walk):
+    """Legs hang from a joint of their own, beside the spine, as in MikuMikuDance."""
+    old = rigs.build("smpl", cmu_walk)[0].skeleton
+    legs = [old.index(name) for name in ("L_Hip", "R_Hip")]
+    parents = [
+        -1,
+        0,
+        *(1 if j in legs else above + (above > 0) for j, above in enumerate(old.parents[1:], 1)),
+    ]
+    bones = np.insert(old.rest_translation, 1, 0.0, axis=0)
+    beside = Skeleton((old.names[0], "pelvis", *old.names[1:]), tuple(parents), bones)
+    found, plain = (find_mapping(renamed(skeleton)) for skeleton in (beside, old))
+    assert found.usable
+    assert found["Hips"] == 0
+    assert tuple(j and j - 1 for j in found.joints) == plain.joints
+
+
 def _with(skeleton: Skeleton, at: str, name: str, bones: list) -> Skeleton:
     """A chain of joints hung from a joint."""
     names, parents, offsets = list(skeleton.names), list(skeleton.parents), list(skeleton.rest_translation)

@@ -91,19 +91,21 @@ def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
     shape = _Shape(skeleton, inside)
     for hips in inside:
         legs = shape.pair(hips)
-        starts = [leg.chain[0] for leg in legs]
-        above = [j for c in shape.children[hips] if c not in starts for j in shape.chain(c)] if legs else []
-        chest = next((joint for joint in above if shape.pair(joint)), None)
-        if chest is None:
-            continue
-        up = shape.placed[chest] - shape.placed[hips]
-        down = np.mean([shape.placed[leg.end] for leg in legs], axis=0) - shape.placed[hips]
-        if np.linalg.norm(up) > 1e-6 and up @ down < -0.5 * np.linalg.norm(up) * np.linalg.norm(down):
-            return {
-                "Hips": hips,
-                **_limbs(shape, legs, shape.pair(chest), up),
-                **_head(shape, chest, up, legs),
-            }
+        below = [hips, *(leg.chain[0] for leg in legs)]
+        # Some pelvises stand beside the spine, below a joint that carries both.
+        for carrier in (hips, skeleton.parents[hips]) if legs else ():
+            above = [j for c in shape.children.get(carrier, ()) if c not in below for j in shape.chain(c)]
+            chest = next((joint for joint in above if shape.pair(joint)), None)
+            if chest is None:
+                continue
+            up = shape.placed[chest] - shape.placed[carrier]
+            down = np.mean([shape.placed[leg.end] for leg in legs], axis=0) - shape.placed[carrier]
+            if np.linalg.norm(up) > 1e-6 and up @ down < -0.5 * np.linalg.norm(up) * np.linalg.norm(down):
+                return {
+                    "Hips": carrier,
+                    **_limbs(shape, legs, shape.pair(chest), up),
+                    **_head(shape, chest, up, legs),
+                }
     return {}
 
 
