@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
-from interpose.cli.console import progress
+from interpose.cli.console import effort, progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, describe, split_names
 from interpose.errors import RequestError
@@ -103,7 +103,8 @@ def between(
     zero = chosen[0] if cut else 0
     points = {zero + frame: point for frame, point in path_of(path, clip).items()}
     pins = [replace(one, frames=zero + one.frames) for one in pins_of(pin, clip)]
-    with progress(f"generating what lies between {len(chosen)} keys of {file.name}", len(clip)) as advance:
+    what = f"generating what lies between {len(chosen)} keys of {file.name}"
+    with progress(what, effort(len(clip), clip.fps)) as advance:
         done = tasks.between(clip, chosen, action, method, seed, advance, cut, points, pins)
     if cut:
         clip = done.clip

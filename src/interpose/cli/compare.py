@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
 
-from interpose.cli.console import figure, names, progress, say, say_json, say_table, seconds
+from interpose.cli.console import effort, figure, names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import UNITS, write_text
 from interpose.cli.reading import Reading, describe, details, split_names
 from interpose.errors import RequestError
@@ -83,7 +83,8 @@ def compare(
     _check(page, force)
     jobs = tasks.plan(clip, Observation.from_gaps(clip, asked), "auto", None, None, {})
     done: dict[str, Completion] = {}
-    with progress(f"comparing {len(chosen)} methods", len(chosen) * sum(map(len, asked))) as advance:
+    work = len(chosen) * effort(sum(map(len, asked)), clip.fps)
+    with progress(f"comparing {len(chosen)} methods", work) as advance:
         for i, name in enumerate(chosen):
             made = tasks.fill(clip, asked, name, seed=seed, parts=parts, path=points, pins=pins)
             # Of the usual ones those are left out that some other method stood in for.

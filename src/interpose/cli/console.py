@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 # Work on fewer frames than this is over before anyone wonders.
 LONG = 3000
+# Networks take as long for a frame as other work for so many.
+NETWORK, RATE = 20, 30.0
 # Lines of a pipe or a file are as long as they need to be.
 WIDE = 250
 
@@ -85,6 +87,11 @@ def names(joints: Sequence[str] | None, most: int = 4) -> str:
 def figure(value: float | None, digits: int = 2) -> str:
     """A number in a table; nothing where there is none."""
     return "" if value is None else f"{value:.{digits}f}"
+
+
+def effort(missing: int, fps: float) -> int:
+    """Frames of other work that take as long as to complete some: networks do so at 30 frames a second."""
+    return round(NETWORK * missing * max(RATE / fps, 1.0))
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from interpose.cli.batch import each
-from interpose.cli.console import names, progress, say, say_json, say_table, seconds
+from interpose.cli.console import effort, names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, finish, numbered
 from interpose.cli.reading import Reading, describe, details
 from interpose.errors import RequestError
@@ -148,7 +148,8 @@ def fill(
     for read in (file, *(one.file for one in request.parts)):
         outputs.check(read, force, gaps)
     missing = sum(map(len, request.gaps))
-    with progress(f"filling {missing} frames of {file.name}", missing + len(clip) // 10) as advance:
+    work = effort(missing, clip.fps) + len(clip) // 10
+    with progress(f"filling {missing} frames of {file.name}", work) as advance:
         done = tasks.fill(
             clip,
             request.gaps,

@@ -10,7 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.batch import each
-from interpose.cli.console import names, progress, say
+from interpose.cli.console import effort, names, progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, joints_of
 from interpose.errors import NothingError
@@ -85,7 +85,8 @@ def recover(
     outputs = Outputs.choose(file, output, "recover", player)
     if not dry_run:
         outputs.check(file, force)
-    with progress(f"recovering {len(gap)} frames of {file.name}", len(gap)) as advance:
+    work = effort(len(gap), clip.fps) if chosen else len(gap)
+    with progress(f"recovering {len(gap)} frames of {file.name}", work) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance, place)
     looked = chosen is None and not place
     others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []

@@ -308,7 +308,8 @@ def run(card: weights.Card, *motions: Seen) -> list[Answer]:
     feed["pins"] = np.stack([one.pins for one in motions])
     told = [one.actions[0] for one in motions]
     feed["label"] = np.array([card.labels.index(action) if action in card.labels else 0 for action in told])
-    said = weights.session(card.onnx).run(["local_out", "root_out", "contact", "error"], feed)
+    session = weights.session(card.onnx, weights.cores())
+    said = session.run(["local_out", "root_out", "contact", "error"], feed)
     return [
         Answer(rotations.normalize(turned), placed + origin, stands, off / 100)
         for turned, placed, stands, off, origin in zip(*(out.astype(float) for out in said), origins)

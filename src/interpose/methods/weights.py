@@ -21,6 +21,7 @@ FOLDERS = (Path(__file__).parents[3] / "weights", Path(__file__).parents[1] / "w
 # What weights may be asked to be licensed for: "open" are those that may be used for anything.
 LICENCES = ("any", "open")
 OPEN = "any use"  # what the licence of open weights begins with
+MOST_THREADS = 4  # more hardly help with matrices of this size
 _asked: list[str] = []  # the licences asked for, by everybody who did: the narrowest holds
 
 
@@ -103,22 +104,35 @@ def for_any_use(licence: str) -> bool:
     return licence.startswith(OPEN)
 
 
-def session(path: Path) -> Any:
-    """The ONNX Runtime session of a graph, on one thread: results do not depend on how busy a machine is.
+def session(path: Path, threads: int = 1) -> Any:
+    """The ONNX Runtime session of a graph, on one thread: convolutions sum up in another order on several,
+    and results are to be the same on every machine.
 
     Raises FileError when the file is damaged.
     """
-    return _session(path.resolve(), path.stat().st_mtime_ns)
+    return _session(path.resolve(), path.stat().st_mtime_ns, threads)
+
+
+def cores() -> int:
+    """On how many threads networks run whose results do not depend on that: as OMP_NUM_THREADS says, or as
+    many as there are cores, four at most."""
+    said = os.environ.get("OMP_NUM_THREADS", "").partition(",")[0]
+    if said.isdecimal() and int(said) > 0:
+        return int(said)
+    here = getattr(os, "sched_getaffinity", lambda _: range(os.cpu_count() or 1))(0)
+    return min(len(here), MOST_THREADS)
 
 
 @lru_cache(maxsize=16)
-def _session(path: Path, changed: int) -> Any:
+def _session(path: Path, changed: int, threads: int) -> Any:
     """The session of a graph as it was when it was `changed` last."""
     import onnxruntime
 
     options = onnxruntime.SessionOptions()
-    options.intra_op_num_threads = 1
+    options.intra_op_num_threads = threads
     options.inter_op_num_threads = 1
+    # Threads that wait do so without taking cores that others use.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     options.log_severity_level = 3  # errors: what it could not fold into constants is nothing to users
     try:
         return onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])
