@@ -9,7 +9,7 @@ run one by one and in one batch, without mirror images.
 
 from __future__ import annotations
 
-import sys
+import argparse
 import time
 from typing import Any
 
@@ -50,7 +50,11 @@ def milliseconds(session: Any, inputs: dict[str, np.ndarray], times: int) -> flo
 
 
 def main() -> None:
-    card = weights.find(sys.argv[1] if len(sys.argv) > 1 else "small")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("network", nargs="?", default="small")
+    card = weights.find(parser.parse_args().network)
     session = weights.session(card.onnx)
     count = round(WHOLE / (LONG + CONTEXT))
     one, batch = milliseconds(session, feed(1, LONG), 25), milliseconds(session, feed(count, LONG), 9)
