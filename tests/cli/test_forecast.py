@@ -83,3 +83,32 @@ def test_its_report_is_none_that_fill_repeats(run, take):
     done = run("fill", "take.bvh", "--gaps", "take.forecast.json", "-o", "again.bvh")
     assert done.code == 2
     assert "Run interpose forecast again." in done.err
+
+
+def test_a_folder_goes_on_clip_by_clip_and_where_it_stopped(run, take):
+    take.with_name("other.bvh").write_bytes(take.read_bytes())
+    asked = [
+        "forecast",
+        ".",
+        "-o",
+        "out",
+        "--method",
+        "stmi-gan",
+        "--samples",
+        "2",
+        "--seed",
+        "1",
+        "--frames",
+        "5",
+    ]
+    assert run(*asked).code == 0
+    made = [f"{name}{end}" for name in ("other", "take") for end in (".1.bvh", ".2.bvh", ".json")]
+    assert sorted(path.name for path in (take.parent / "out").iterdir()) == made
+    assert run(*asked).code == 2  # nothing is replaced
+    (take.parent / "out" / "take.2.bvh").unlink()
+    (take.parent / "out" / "take.1.bvh").unlink()
+    (take.parent / "out" / "take.json").unlink()
+    done = run(*asked, "--skip-existing")
+    assert done.code == 0
+    assert "skipped other.bvh" in done.out
+    assert sorted(path.name for path in (take.parent / "out").iterdir()) == made

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 from cyclopts import Parameter
 
+from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
@@ -20,6 +22,15 @@ COLORS = ("#d1495b", "#2a78c2", "#3a9d5d", "#c98a1b", "#7a5bb5", "#2aa4a4", "#b5
 MOST = 100  # samples
 
 
+def _earlier(path: Path, options: dict[str, Any]) -> tuple[Path, dict[str, Any]] | None:
+    """What an earlier run made of a clip, all of its samples, and the report."""
+    outputs = Outputs.choose(path, options.get("output"), "forecast", bool(options.get("player")))
+    clips = _clips(outputs.clip, options.get("samples", 1))
+    report = Outputs(clips[0], outputs.report, outputs.page).earlier("forecast")
+    return (clips[0], report) if report and all(map(Path.exists, clips)) else None
+
+
+@partial(each, earlier=_earlier)
 def forecast(
     file: Path,
     /,
@@ -49,12 +60,13 @@ def forecast(
       interpose forecast take.bvh --method stmi-gan --samples 5 --temperature 2
 
     Args:
-        file: the clip (.bvh, .npz, .amc).
+        file: the clip (.bvh, .npz, .amc), or a folder of clips.
+        more: further ones: each is done by itself.
         frames: how many to add, at the clip's own rate; 2 seconds without it.
         samples: in how many ways it may go on, each in a file of its own; for methods that draw at random.
         seed: of what is drawn at random. One sample without it is the most likely one.
         temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
-        output: where to write the clip; the report goes beside it.
+        output: where to write the clip; the report goes beside it. Of several clips a folder.
         method: how it is continued: auto (the default), base, stmi-gan, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         player: write a page (take.forecast.html) that plays all samples; it opens in any browser.
