@@ -49,6 +49,14 @@ def test_of_many_takes_each_fifth_is_held_out(takes):
     assert own_pack(takes, 56).splits.tolist() == ["train"] * 4 + ["validation"] + ["train"] * 2
 
 
+def test_a_short_fifth_take_does_not_keep_the_others_from_being_used(takes):
+    short = load(takes / "a.bvh").slice(0, 40)
+    for number in range(3):
+        save(short, takes / f"b{number}.bvh")
+    shutil.copy(takes / "a.bvh", takes / "z.bvh")
+    assert own_pack(takes, 56).splits.tolist() == ["train", "validation"] * 6
+
+
 def test_what_interpose_made_is_no_take(takes):
     """What else lies beside a take, as the labels of Bandai-Namco's, is no report."""
     shutil.copy(takes / "a.bvh", takes / "a.filled.bvh")

@@ -20,6 +20,7 @@ from interpose.methods import weights  # noqa: E402
 from interpose.models.base import Base, BaseConfig  # noqa: E402
 from interpose.training import cae, export  # noqa: E402
 from interpose.training.base import BaseSettings, train_base  # noqa: E402
+from interpose.training.base import begin as begin_base  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cmib import CmibSettings, train_cmib  # noqa: E402
 from interpose.training.loop import Settings, Trainer  # noqa: E402
@@ -130,7 +131,7 @@ def test_labels_and_wires_stay_as_they_are(walk_pack, tmp_path):
     save_file(Base(network).state_dict(), tmp_path / "tiny.safetensors")
     training = {"config": "small", "network": {**asdict(network), "labels": None}}
     start = replace(START, labels=["", "walk", "bow"], training=training, path=tmp_path / "tiny.json")
-    settings = BaseSettings(batch=2, longest=20)
+    settings = BaseSettings(batch=2, longest=20, near=0)
     steps = kept_at_each_step(train_base, two_labels(walk_pack), tmp_path / "run", settings, start, "network")
     for kept in steps:
         assert (kept["labels"], kept["near"], kept["heads"]) == (["", "walk", "bow"], False, 2)
@@ -173,7 +174,7 @@ def test_splits_are_told_once(walk_pack, tmp_path, capsys, monkeypatch):
     # Of an older run both are told again, as they were.
     path = tmp_path / "run" / "settings.json"
     kept = json.loads(path.read_text())
-    path.write_text(json.dumps({n: v for n, v in kept.items() if n not in ("splits", "packs")}))
+    path.write_text(json.dumps({n: v for n, v in kept.items() if n not in ("splits", "packs", "held")}))
     assert main(words) == 0
     assert "--splits train,validation" in capsys.readouterr().out
     assert main([*command, "--force", "--splits", "train"]) == 0
@@ -190,3 +191,56 @@ def test_packs_that_were_not_trained_on_are_not_named(walk_pack, tmp_path, monke
     assert [one["name"] for one in card.data] == ["cmu"]
     with pytest.raises(RequestError, match="there is no pack of cmu"):
         export.export_cae(tmp_path, packs[:1], tmp_path / "weights")
+
+
+def test_packs_of_the_same_name_that_hold_something_else_are_refused(walk_pack, tmp_path, monkeypatch):
+    """The card would tell of data that the run never saw."""
+    monkeypatch.setattr(export, "export_cae_onnx", lambda model, path: path.touch())
+    pack, budget = walk_pack("cmu"), Budget.parse("1steps")
+    cae.train_cae([pack], tmp_path, budget, cae.CaeSettings(length=64, batch=1), say=str)
+    fewer = replace(pack, starts=pack.starts - (np.arange(len(pack.starts)) == 1))
+    with pytest.raises(RequestError, match="not trained on this pack of cmu"):
+        export.export_cae(tmp_path, [fewer], tmp_path / "weights")
+    with pytest.raises(RequestError, match="cannot go on"):
+        cae.train_cae([fewer], tmp_path, Budget.parse("2steps"), cae.CaeSettings(length=64, batch=1), say=str)
+    assert export.export_cae(tmp_path, [pack], tmp_path / "weights").data[0]["clips"] == 1
+
+
+def test_a_run_that_gets_lost_ends_and_what_it_had_saved_stays(tmp_path):
+    model, steps = torch.nn.Linear(1, 1), iter(range(9))
+    trainer = Trainer(
+        model,
+        lambda rng, fraction: model.weight.sum() * (float("nan") if next(steps) > 1 else 1.0),
+        lambda averaged: {},
+        tmp_path,
+        Budget.parse("5steps"),
+        Settings(every_seconds=0.0),
+        lambda line: None,
+    )
+    with pytest.raises(RequestError, match="got lost") as error:
+        trainer.go("")
+    assert "learning_rate" in error.value.fix
+    kept = torch.load(tmp_path / "averaged.pt", weights_only=True)
+    assert all(value.isfinite().all() for value in kept.values())
+    assert "NaN" not in (tmp_path / "log.jsonl").read_text()
+
+
+@pytest.mark.parametrize("changes", [{"velocities": 0}, {"layers": 5}])
+def test_weights_are_not_said_to_be_wired_otherwise(changes):
+    small = weights.find("small")
+    with pytest.raises(RequestError, match=f"cannot begin with small and {next(iter(changes))}"):
+        begin_base(BaseSettings(**changes), tuple(small.labels), small)
+    assert begin_base(BaseSettings(), tuple(small.labels), small).config.layers == 6
+
+
+def test_a_log_whose_last_line_is_cut_off_is_read(walk_pack, tmp_path, monkeypatch):
+    monkeypatch.setattr(export, "export_cae_onnx", lambda model, path: path.touch())
+    pack, settings = walk_pack("cmu"), cae.CaeSettings(length=64, batch=1, every_seconds=0.0)
+    cae.train_cae([pack], tmp_path, Budget.parse("2steps"), settings, say=str)
+    with (tmp_path / "log.jsonl").open("a") as log:
+        log.write('{"step": 3, "lo')
+    assert export.export_cae(tmp_path, [pack], tmp_path / "weights").training["steps"] == 2
+    whole = (tmp_path / "averaged.pt").read_bytes()
+    (tmp_path / "averaged.pt").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileError, match="cannot export"):
+        export.export_cae(tmp_path, [pack], tmp_path / "weights")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -160,5 +161,10 @@ def _export(write: Callable[..., Any], of: Of, out: Path) -> None:
     if not of.force and (there := sorted(out.glob("*.onnx"))):
         why = f"{there[0].name} is in there"
         raise FileError(f"cannot write into {out}", why, "Choose another --out, or add --force.")
-    card = write(of.run, load_packs(of.packs), out, chosen)
+    packs = load_packs(of.packs)
+    try:
+        card = write(of.run, packs, out, chosen)
+    except (KeyError, TypeError, json.JSONDecodeError) as error:
+        why = f"its settings are of another recipe, or damaged: {type(error).__name__}, {error}"
+        raise FileError(f"cannot export {of.run}", why, "Export it as what it was trained.") from None
     say(f"wrote {out / card.name}.onnx, {out / card.name}.json and the training log ({card.licence})")

@@ -19,7 +19,7 @@ METHODS = {
     "stmi-gan": "the spatio-temporal inpainting GAN of Hernandez Ruiz et al. 2019: forecasts, with samples",
     "stmi-gan-dense": "the same at 30 frames a second: forecasts that keep moving, and gaps, roughly",
     "base": "interpose's own network: gaps, lost joints and limbs, pins; any part of a pose is enough",
-    "small": "the same kind of network, a seventh of its size and eight times as fast",
+    "small": "the same kind of network, a seventh of its size, four to seven times as fast",
     "small-open": "the same as small, of weights for any use, learned from CMU's data alone",
     "cae": "the convolutional autoencoder of Kaufmann et al. 2020: gaps from half a second to four",
 }

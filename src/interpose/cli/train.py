@@ -146,11 +146,13 @@ def own(
         set: change a setting of the recipe: name=value. May be repeated.
     """
     with needs_torch("train a network"):
-        from interpose.training.base import JUDGED, BaseSettings, judge, train_base
+        from interpose.training.base import JUDGED, WIRING, BaseSettings, judge, train_base
         from interpose.training.export import export_base
     from interpose.datasets.own import own_pack
     from interpose.methods import registry, weights
+    from interpose.observation.gapfile import read_json
     from interpose.training.budget import Budget
+    from interpose.training.device import rank
 
     begin = weights.card(from_)
     if not begin.training["recipe"].startswith("interpose train base"):
@@ -168,7 +170,10 @@ def own(
         )
     asked = Budget.parse(budget)
     # Gently: what it knows of all motion is to stay.
-    gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0)
+    wired: dict[str, Any] = {
+        name: int(on) for name, on in begin.training["network"].items() if name in WIRING
+    }
+    gentle = BaseSettings(config=begin.training["config"], learning_rate=1e-3, every_seconds=60.0, **wired)
     settings = change(gentle, set)
     pack = own_pack(data, JUDGED, say)
     held = pack.splits == "validation"
@@ -178,14 +183,18 @@ def own(
     takes = {
         "start": begin.training.get("steps"),
         "clips": pack.names.tolist(),
+        "seconds": pack.seconds.tolist(),
         "splits": pack.splits.tolist(),
     }
-    if (run / "checkpoint.pt").exists() and json.loads((run / "takes.json").read_text()) != takes:
+    if (run / "checkpoint.pt").exists() and read_json(run / "takes.json") != takes:
         why = "its clips or the weights that it began with are others now"
         raise RequestError(f"the run in {run} cannot go on", why, "Name another --out.")
     run.mkdir(parents=True, exist_ok=True)
-    (run / "takes.json").write_text(json.dumps(takes) + "\n")
+    if rank() == 0:
+        (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
+    if rank() > 0:
+        return  # one process is enough for the rest
     export_base(run, [pack], out)
     before, after = (judge(card, pack) for card in (begin, weights.card(str(out))))
     say()

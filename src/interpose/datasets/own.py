@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,13 +58,15 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
             "none of its clips could be used" if paths else f"it holds no clip ({', '.join(FORMATS)})",
             "Name a folder of whole, clean takes.",
         )
+    # Each fifth clip, where there are so many, and one of those is long enough to be judged by.
+    apart = any(len(clip) >= shortest for _, clip in found[FIFTH - 1 :: FIFTH])
     parts, performers = [], dict[tuple[object, ...], str]()
     for number, (name, clip) in enumerate(found):
         # Who has the same joints and bones is taken for one performer.
         bones = (clip.skeleton.names, clip.skeleton.rest_translation.round(3).tobytes())
         performer = performers.setdefault(bones, str(len(performers)))
         cut = len(clip) - len(clip) // FIFTH
-        if len(found) < FIFTH:
+        if not apart:
             pieces = [("train", clip.slice(0, cut)), ("validation", clip.slice(cut, len(clip)))]
         else:
             pieces = [("validation" if number % FIFTH == FIFTH - 1 else "train", clip)]
@@ -73,6 +76,6 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
         raise FileError(
             f"the clips in {folder} are too short",
             f"a fifth of them is held out, and no part of it has {shortest} frames at {FPS:g} fps",
-            f"Add longer takes: {FIFTH * shortest / FPS:.0f} s in one clip are enough.",
+            f"Add longer takes: {math.ceil(FIFTH * shortest / FPS)} s in one clip are enough.",
         )
     return assemble(NAME, parts)

@@ -5,15 +5,17 @@ Test performers never enter a pack, so that no recipe can train on them.
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
 from interpose.clip import Clip
 from interpose.datasets.catalogue import FPS, clips
-from interpose.errors import FileError
+from interpose.errors import FileError, InterposeError
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
 from interpose.skeletons import JOINTS, canonical_positions, find_humanoid
@@ -60,7 +62,7 @@ class Pack:
         try:
             with np.load(path) as held:
                 return cls(**{name: held[name][()] for name in cls.__dataclass_fields__})
-        except (OSError, KeyError, ValueError) as reason:
+        except (OSError, KeyError, ValueError, EOFError, BadZipFile, zlib.error) as reason:
             raise FileError(
                 f"cannot read the pack {path}",
                 str(reason),
@@ -100,12 +102,16 @@ class Part:
 def build_pack(dataset: str, data: Path, progress: Callable[[str], None] = lambda line: None) -> Pack:
     """Read all clips of a data set but the test performers', and pack them.
 
-    Clips that are too short, or in which the body jumps, are told to `progress` and left out.
+    Clips that cannot be read, are too short, or in which the body jumps, are told to `progress` and left out.
     """
     chosen: list[Part] = []
     for entry in clips(dataset, data):
         if entry.split != "test":
-            clip = resample(entry.load(), FPS)
+            try:
+                clip = resample(entry.load(), FPS)
+            except InterposeError as error:
+                progress(f"left out: {entry.name} ({error.what}: {error.why})")
+                continue
             if reason := unfit(clip):
                 progress(f"left out: {entry.name} ({reason})")
             else:

@@ -6,7 +6,7 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from functools import cache, lru_cache
 from importlib.util import find_spec
 from pathlib import Path
@@ -89,14 +89,40 @@ class Card:
     @classmethod
     def load(cls, path: Path) -> Card:
         """Read a card; FileError when it is damaged."""
+        again = "Export the weights again; of interpose's own: install it again."
         try:
-            return cls(**json.loads(path.read_text()), path=path)
-        except (OSError, ValueError, TypeError) as reason:
-            raise FileError(
-                f"cannot read the card {path}",
-                str(reason),
-                "Export the weights again; of interpose's own: install it again.",
-            ) from None
+            held = json.loads(path.read_text())
+            if new := sorted(held.keys() - {one.name for one in fields(cls)}):
+                why = f"it says {', '.join(new)}, of which this version knows nothing"
+                raise FileError(f"cannot read the card {path}", why, "Install a newer interpose.")
+            card = cls(**held, path=path)
+            card._check()
+        except FileError:
+            raise
+        except FileNotFoundError:
+            why = "a graph NAME.onnx needs its card NAME.json beside it"
+            raise FileError(f"there is no {path}", why, again) from None
+        except (OSError, ValueError, TypeError, AttributeError) as reason:
+            raise FileError(f"cannot read the card {path}", str(reason), again) from None
+        return card
+
+    def _check(self) -> None:
+        """Raises ValueError where a value is none that it can have."""
+        kinds = {
+            str: ("name", "method", "description", "licence"),
+            list: ("data", "tasks", "joints", "labels"),
+        }
+        kinds |= {dict: ("training", "metrics", "auto", "paces")}
+        for kind, names in kinds.items():
+            for name in names:
+                if not isinstance(getattr(self, name), kind):
+                    raise ValueError(f"its {name} is {getattr(self, name)!r}")
+        for name in ("fps", "max_gap"):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e6:
+                raise ValueError(f"its {name} is {value!r}")
+        if not self.joints:
+            raise ValueError("it knows no joints")
 
 
 def for_any_use(licence: str) -> bool:

@@ -73,6 +73,10 @@ TASKS: dict[str, dict[str, float]] = {
 }
 
 
+# How a network is wired, which none can change that begins with another.
+WIRING = ("residual", "velocities", "near", "apart", "distances", "room")
+
+
 @dataclass
 class BaseSettings(Settings):
     """The recipe."""
@@ -85,9 +89,7 @@ class BaseSettings(Settings):
         "context": (1, (BaseConfig().longest - 1) // 2),  # the network sees it on both sides of a gap
         "labelled": SHARE,
         "dropout": (0, 0.9),
-        **dict.fromkeys(
-            ("muon", "mirror", "residual", "velocities", "near", "apart", "distances", "room"), SWITCH
-        ),
+        **dict.fromkeys(("muon", "mirror", *WIRING), SWITCH),
     }
 
     config: str = "small"  # one of CONFIGS
@@ -333,10 +335,19 @@ def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -
     # What a network is wired like has no weights of its own that could tell.
     wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout}
     model = Base(BaseConfig(**wired))
-    restore(model, start.onnx)
     # Larger than they were only where that is asked for: by name, or by its width.
     larger = settings.width or settings.config != start.training["config"]
-    if not (larger and asked.width > model.config.width):
+    grows = larger and asked.width > model.config.width
+    sizes = () if grows else tuple(name for name in ("width", "heads", "layers") if getattr(settings, name))
+    for name in (*WIRING, *sizes):
+        if (now := getattr(asked, name)) != (then := getattr(model.config, name)):
+            raise RequestError(
+                f"cannot begin with {start.name} and {name}={int(now)}",
+                f"it has {name}={int(then)}",
+                f"Write --set {name}={int(then)}, or train from nothing, without --start.",
+            )
+    restore(model, start.onnx)
+    if not grows:
         return model
     grown = Base(replace(model.config, width=asked.width, heads=asked.heads, layers=asked.layers))
     grown.grow(model)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import datetime
 import json
+import pickle
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,7 +17,7 @@ from safetensors.torch import save
 
 from interpose.datasets import DATASETS, Pack
 from interpose.datasets.own import NAME as OWN
-from interpose.errors import RequestError
+from interpose.errors import FileError, RequestError
 from interpose.methods.registry import METHODS
 from interpose.methods.weights import OPEN, Card
 from interpose.models.base import Base, BaseConfig
@@ -33,7 +35,7 @@ from interpose.training.graphs import (
     export_seq2seq_onnx,
     export_stmi_gan_onnx,
 )
-from interpose.training.loop import restore
+from interpose.training.loop import restore, sizes
 from interpose.training.poses import Poses
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 from interpose.training.stmi_gan import JUDGE
@@ -88,10 +90,15 @@ class _Run:
         """Read it. `packs` are those that there are, `splits` those of a run that has none on record."""
 
         def lines(name: str) -> list[dict[str, Any]]:
-            return [json.loads(line) for line in (folder / name).read_text().splitlines()]
+            found = []
+            for line in (folder / name).read_text().splitlines():
+                with suppress(ValueError):  # the last one, of a run that was killed as it wrote
+                    found.append(json.loads(line))
+            return found
 
         settings: dict[str, Any] = json.loads((folder / "settings.json").read_text())
         packs = chosen(packs, ",".join(settings.pop("packs", [])))
+        held = settings.pop("held", {})
         kept_splits = settings.pop("splits", None)
         if kept_splits and splits and {*kept_splits} != {*splits}:
             raise RequestError(
@@ -99,6 +106,15 @@ class _Run:
                 f"it has {','.join(kept_splits)} on record",
                 "Leave out --splits.",
             )
+        for pack in packs:
+            name, now = str(pack.dataset), sizes(pack, kept_splits or [])
+            if name in held and held[name] != now:
+                raise RequestError(
+                    f"{folder} was not trained on this pack of {name}",
+                    f"it holds {now['clips']} clips, {now['frames']} frames, and {held[name]['clips']}, "
+                    f"{held[name]['frames']} are on record",
+                    "Name the folder of those that it was trained on with --packs.",
+                )
         known = (folder, packs, kept_splits or list(splits) or ["train"], settings)
         if not (folder / "earlier.json").exists():
             return cls(*known, lines("log.jsonl"), [], {"from_gap": 61})
@@ -124,8 +140,15 @@ class _Run:
             raise RequestError(
                 f"cannot write {name}.onnx into {out}", f"{others[0].name} is in there", "Write --out FOLDER."
             )
-        held = torch.load(self.folder / "averaged.pt", map_location="cpu", weights_only=True)
-        model.load_state_dict(held)
+        try:
+            held = torch.load(self.folder / "averaged.pt", map_location="cpu", weights_only=True)
+            model.load_state_dict(held)
+        except (RuntimeError, EOFError, pickle.UnpicklingError) as reason:
+            raise FileError(
+                f"cannot export {self.folder}",
+                f"averaged.pt is damaged, or of another network: {str(reason).splitlines()[0]}",
+                "Go on with the run, or train anew.",
+            ) from None
         out.mkdir(parents=True, exist_ok=True)
         (out / "log.jsonl").write_text("".join(json.dumps(entry) + "\n" for entry in self.log))
         return out / f"{name}.onnx"
@@ -395,13 +418,10 @@ def _joined(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _data(packs: list[Pack], splits: list[str]) -> list[dict[str, Any]]:
     """What of the packs was trained on, for the card."""
-    data = []
-    for pack in packs:
-        kept = np.isin(pack.splits, splits)
-        frames = int(np.diff(pack.starts)[kept].sum())
-        name = str(pack.dataset)
-        data.append({"name": name, "licence": LICENCES[name], "clips": int(kept.sum()), "frames": frames})
-    return data
+    names = [str(pack.dataset) for pack in packs]
+    return [
+        {"name": name, "licence": LICENCES[name], **sizes(pack, splits)} for name, pack in zip(names, packs)
+    ]
 
 
 def _curves(log: list[dict[str, Any]], name: str, unit: str, gaps: tuple[int, ...], out: Path) -> None:

@@ -7,6 +7,7 @@ import json
 import math
 import os
 import pickle
+import re
 import signal
 import subprocess
 import threading
@@ -98,9 +99,22 @@ def shard_paths(path: Path) -> list[Path]:
 def _exported(path: Path) -> dict[str, Tensor]:
     """The weights of an exported graph by name: those beside it, or else those that it holds itself."""
     if shards := shard_paths(path):
+        from safetensors import SafetensorError
         from safetensors.torch import load_file
 
-        return {name: value for shard in shards for name, value in load_file(shard).items()}
+        numbered = re.fullmatch(r".*-of-(\d+)", shards[0].stem)
+        if numbered and len(shards) != int(numbered[1]):
+            raise FileError(
+                f"cannot read the weights beside {path}",
+                f"of {int(numbered[1])} files {len(shards)} are there",
+                "Copy all files of the folder.",
+            )
+        try:
+            return {name: value for shard in shards for name, value in load_file(shard).items()}
+        except SafetensorError as reason:
+            raise FileError(
+                f"cannot read the weights beside {path}", str(reason), "Copy them once more."
+            ) from None
     import onnx
     from onnx import numpy_helper
 
@@ -194,7 +208,14 @@ def _write(path: Path, text: str) -> None:
 
 def taught(packs: Sequence[Pack], splits: Sequence[str]) -> dict[str, Any]:
     """What a run learns from, for its record."""
-    return {"packs": sorted(str(pack.dataset) for pack in packs), "splits": sorted({*splits})}
+    held = {str(pack.dataset): sizes(pack, splits) for pack in packs}
+    return {"packs": sorted(held), "splits": sorted({*splits}), "held": held}
+
+
+def sizes(pack: Pack, splits: Sequence[str]) -> dict[str, int]:
+    """How many clips of some splits a pack holds, and how many frames of them."""
+    kept = np.isin(pack.splits, list(splits))
+    return {"clips": int(kept.sum()), "frames": int(np.diff(pack.starts)[kept].sum())}
 
 
 def recorded(folder: Path, network: str = "") -> dict[str, Any] | None:
@@ -461,8 +482,20 @@ class Trainer:
             due = time.monotonic() - told > self.settings.every_seconds or ends
             if due and rank() == 0:
                 said = {"loss": losses, **({"opponent": against} if against else {})}
-                self._tell({name: round(float(torch.stack(some).mean()), 5) for name, some in said.items()})
+                so_far = {name: round(float(torch.stack(some).mean()), 5) for name, some in said.items()}
+                self._check(so_far)
+                self._tell(so_far)
                 told, losses, against = time.monotonic(), [], []
+
+    def _check(self, losses: dict[str, float]) -> None:
+        """RequestError where the network got lost: what was saved last stays as it is."""
+        weights = torch.stack([held.isfinite().all() for held in self.averaged.parameters()])
+        if not all(map(math.isfinite, losses.values())) or not weights.all():
+            raise RequestError(
+                f"the run in {self.folder} got lost",
+                f"its loss or its weights are no numbers any more, at step {self.budget.spent_steps}",
+                "Train anew, in another --out, with a smaller --set learning_rate.",
+            )
 
     def _draw(self, entry: dict[str, float]) -> None:
         """Curves over steps, for those who look at them in TensorBoard."""

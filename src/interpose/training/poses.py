@@ -80,9 +80,11 @@ class Poses:
                     counts.append(part.stop - part.start)
         if not counts:
             raise RequestError(
-                "there is nothing to train on",
+                "there is nothing to validate with"
+                if "validation" in splits
+                else "there is nothing to train on",
                 f"the packs hold no clip of {', '.join(splits)} with {longest} frames or more",
-                "Make packs with: interpose data pack.",
+                "Make packs of sets with performers of both (lafan1, bandai, cmu): interpose data pack.",
             )
         self.device, self.counts = device, np.array(counts)
         self.starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
