@@ -104,7 +104,7 @@ def between(
     points = {zero + frame: point for frame, point in path_of(path, clip).items()}
     pins = [replace(one, frames=zero + one.frames) for one in pins_of(pin, clip)]
     what = f"generating what lies between {len(chosen)} keys of {file.name}"
-    missing = max(chosen) + 1 - min(chosen) - len({*chosen})
+    missing = max(chosen, default=0) - min(chosen, default=0)
     with progress(what, effort(missing, clip.fps)) as advance:
         done = tasks.between(clip, chosen, action, method, seed, advance, cut, points, pins)
     if cut:
