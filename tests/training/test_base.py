@@ -565,6 +565,9 @@ def test_a_run_that_starts_from_weights_is_wired_like_them(walk_pack, tmp_path, 
     export_base(tmp_path / "first", [pack], tmp_path / "weights", ["train"])
     card = weights.load(tmp_path / "weights", "small")
     plain = BaseSettings(batch=2, longest=40, every_seconds=1e9)
+    with pytest.raises(RequestError, match="cannot begin with small and velocities=1"):
+        train_base([pack], tmp_path / "second", Budget.parse("1steps"), plain, start=card)
+    plain = replace(plain, near=0, velocities=0)
     train_base([pack], tmp_path / "second", Budget.parse("1steps"), plain, start=card)
     network = json.loads((tmp_path / "second" / "settings.json").read_text())["network"]
     assert (network["width"], network["layers"], network["near"], network["velocities"]) == (
@@ -593,7 +596,7 @@ def test_a_run_for_a_wider_network_begins_with_the_one_it_starts_from(walk_pack,
     train_base([pack], tmp_path / "first", Budget.parse("1steps"), first)
     export_base(tmp_path / "first", [pack], tmp_path / "weights", ["train"])
     card = weights.load(tmp_path / "weights", "small")
-    wider = replace(first, width=48, heads=12, layers=2, near=1, learning_rate=1e-9)
+    wider = replace(first, width=48, heads=12, layers=2, learning_rate=1e-9)
     train_base([pack], tmp_path / "second", Budget.parse("1steps"), wider, start=card)
     settings = json.loads((tmp_path / "second" / "settings.json").read_text())
     assert [settings["network"][name] for name in ("width", "heads", "layers", "near")] == [48, 12, 2, False]

@@ -117,9 +117,9 @@ class Card:
             for name in names:
                 if not isinstance(getattr(self, name), kind):
                     raise ValueError(f"its {name} is {getattr(self, name)!r}")
-        for name in ("fps", "max_gap"):
+        for name, least in (("fps", 0.1), ("max_gap", 0)):
             value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < 1e6:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not least <= value < 1e6:
                 raise ValueError(f"its {name} is {value!r}")
         if not self.joints:
             raise ValueError("it knows no joints")
