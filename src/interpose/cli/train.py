@@ -190,8 +190,7 @@ def own(
         why = "its clips or the weights that it began with are others now"
         raise RequestError(f"the run in {run} cannot go on", why, "Name another --out.")
     run.mkdir(parents=True, exist_ok=True)
-    if rank() == 0:
-        (run / "takes.json").write_text(json.dumps(takes) + "\n")
+    (run / "takes.json").write_text(json.dumps(takes) + "\n")
     train_base([pack], run, asked, settings, start=begin, say=say)
     if rank() > 0:
         return  # one process is enough for the rest
