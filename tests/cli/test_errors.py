@@ -39,6 +39,8 @@ def three_lines(err: str) -> list[str]:
         (["--gap", "60:80", "--max-gap", "0"], "--max-gap"),
         (["--gap", "60:80", "--max-gap", "many"], "a number of frames"),
         (["--gap", "60:80", "--only-gap", "7"], "7"),
+        (["--gap", "60:80", "--only-gap", "1.5"], "a whole number"),
+        (["--gap", "60:80", "--seed", "1.5"], "a whole number"),
         (["--gap", "60:80", "-o", "out.fbx"], ".bvh"),
         (["--gap", "60:80", "-o", "no/such/out.bvh"], "no/such"),
         (["--gap", "60:80", "-o", "out"], ".bvh"),

@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from interpose.cli.console import effort, progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, describe, split_names
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def between(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
     license: str = "any",
-    seed: int | None = None,
+    seed: Whole | None = None,
     player: bool = False,
     json: bool = False,
     force: bool = False,

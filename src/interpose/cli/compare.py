@@ -11,6 +11,7 @@ from cyclopts import Parameter
 from interpose.cli.console import effort, figure, names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import UNITS, write_text
 from interpose.cli.reading import Reading, describe, details, split_names
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def compare(
     methods: list[str] = [],  # noqa: B006
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     license: str = "any",
-    seed: int | None = None,
+    seed: Whole | None = None,
     json: bool = False,
     force: bool = False,
     reading: Reading = Reading(),

@@ -11,6 +11,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, to_json, write
 from interpose.cli.reading import Reading, describe, joints_of
+from interpose.cli.whole import Whole
 
 UNITS = {"noise": "cm", "moved": "cm", "moved_most": "cm", "turned": "degrees", "turned_most": "degrees"}
 
@@ -25,7 +26,7 @@ def denoise(
     frames: str | None = None,
     method: str = "auto",
     license: str = "any",
-    seed: int | None = None,
+    seed: Whole | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     player: bool = False,
     dry_run: bool = False,

@@ -12,6 +12,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import effort, names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, finish, numbered
 from interpose.cli.reading import Reading, describe, details
+from interpose.cli.whole import WHOLE, Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -30,7 +31,7 @@ def fill(
     gaps: Path | None = None,
     from_: Annotated[Path | None, Parameter(name="--from")] = None,
     from_range: str | None = None,
-    at: int | None = None,
+    at: Whole | None = None,
     layer: bool = False,
     path: list[str] = [],  # noqa: B006
     pin: list[str] = [],  # noqa: B006
@@ -38,8 +39,8 @@ def fill(
     method: str | None = None,
     license: str = "any",
     max_gap: str | None = None,
-    only_gap: list[int] = [],  # noqa: B006
-    seed: int | None = None,
+    only_gap: Annotated[list[int], WHOLE] = [],  # noqa: B006
+    seed: Whole | None = None,
     player: bool = False,
     dry_run: bool = False,
     json: bool = False,

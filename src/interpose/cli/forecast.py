@@ -12,6 +12,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -35,9 +36,9 @@ def forecast(
     file: Path,
     /,
     *,
-    frames: int | None = None,
-    samples: int = 1,
-    seed: int | None = None,
+    frames: Whole | None = None,
+    samples: Whole = 1,
+    seed: Whole | None = None,
     temperature: float = 1.0,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",

@@ -13,6 +13,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import effort, names, progress, say
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, joints_of
+from interpose.cli.whole import Whole
 from interpose.errors import NothingError
 
 SHOWN = 4  # losses, of many
@@ -29,7 +30,7 @@ def recover(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
     license: str = "any",
-    seed: int | None = None,
+    seed: Whole | None = None,
     player: bool = False,
     dry_run: bool = False,
     json: bool = False,

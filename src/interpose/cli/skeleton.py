@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from interpose.cli.console import say, say_json, say_table
 from interpose.cli.reading import Reading, describe, details
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -29,7 +30,7 @@ def skeleton(
     *,
     save_map: Path | None = None,
     picture: Path | None = None,
-    rest_frame: int | None = None,
+    rest_frame: Whole | None = None,
     at: str | None = None,
     json: bool = False,
     force: bool = False,

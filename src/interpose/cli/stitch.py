@@ -13,6 +13,7 @@ from cyclopts import Parameter
 from interpose.cli.console import names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 from interpose.formats.place import vectors_in_file
 from interpose.observation import Gap
@@ -66,7 +67,7 @@ def stitch(
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
     method: str = "auto",
     license: str = "any",
-    seed: int | None = None,
+    seed: Whole | None = None,
     player: bool = False,
     json: bool = False,
     force: bool = False,

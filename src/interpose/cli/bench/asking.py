@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Protocol
 
 from cyclopts import App, Parameter
-from cyclopts.validators import Number
 
 from interpose.cli.console import console, say, say_json
 from interpose.cli.research import shown
+from interpose.cli.whole import Count
 
 if TYPE_CHECKING:
     from interpose.evaluation.conditions import Table
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 
 # How many windows are measured.
-Count = Annotated[int, Parameter(validator=Number(gte=1))]
 Most = Count | None
 
 

@@ -7,6 +7,7 @@ from typing import Literal
 
 from interpose.cli.bench.asking import Most, Tabled, bar, bench, show
 from interpose.cli.console import say, say_json
+from interpose.cli.whole import Count, Whole
 from interpose.errors import RequestError
 
 
@@ -16,7 +17,7 @@ def forecasting(
     weights: list[Path] = [],  # noqa: B006
     fps: Literal[5, 30] = 5,
     variant: Literal["paper", "code"] = "paper",
-    samples: int = 5,
+    samples: Count = 5,
     most: Most = None,
     asked: Tabled = Tabled(),
 ) -> None:
@@ -90,7 +91,7 @@ def human(
     generated: list[Path] = [],  # noqa: B006
     survey: Path = Path("survey"),
     relative: bool = False,
-    seed: int = 0,
+    seed: Whole = 0,
     votes: list[Path] = [],  # noqa: B006
     force: bool = False,
     json: bool = False,

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from interpose.cli.bench.asking import Count, Most, Tabled, bar, bench, cards_of, show
+from interpose.cli.bench.asking import Most, Tabled, bar, bench, cards_of, show
 from interpose.cli.research import needs_torch
+from interpose.cli.whole import Count
 
 
 @bench.command
