@@ -89,6 +89,18 @@ def test_a_joint_that_whirls_goes_the_short_way(cmu_walk):
     np.testing.assert_allclose(done.clip.rotation[:, others], plain.rotation[:, others], atol=1e-6)
 
 
+@pytest.mark.parametrize(("joint", "most"), [("Head", 640), ("Spine1", 280), ("RightUpLeg", 900)])
+def test_a_trunk_turns_slower_than_a_hand(cmu_walk, joint, most):
+    """Seventy degrees there and back in four frames, which a hand may."""
+    there = 70.0 * np.interp(np.arange(len(GAP)), [16, 18, 20], [0, 1, 0])
+    rates = []
+    for method in (Turning(joint, "Y", there), Turning("RightHand", "Y", there)):
+        clip = filled(cmu_walk, method).clip
+        turned = clip.rotation[:, clip.skeleton.index(method.joint)]
+        rates.append(np.degrees(rotations.angle(turned[1:], turned[:-1]))[INSIDE].max() * cmu_walk.fps)
+    assert rates[0] < most < 1000 < rates[1]
+
+
 def twice_round():
     """Nothing to 720 degrees, as smoothly as can be."""
     share = np.linspace(0, 1, len(GAP))

@@ -431,8 +431,9 @@ def of(path):  # type: ignore[no-untyped-def]
     return replace(card, path=path.with_suffix(".json"))
 
 
-def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given, tmp_path):
+def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given, tmp_path, monkeypatch):
     """And an action that they do not know is none to them; what is known stays exactly."""
+    monkeypatch.setattr(method, "CALMER", 0.0)  # what is drawn at random snaps, all of it
     cards = []
     for seed in (1, 2):
         other = onnx.load(graph)
@@ -472,7 +473,7 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
     for limit in (np.pi, 0.0):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(method, "AGREE", limit)
-            said, other = method.run_both(card, seen), method.run_both(card, seen.mirrored())
+            said, other = (method.run_both(card, one, slice(0, 40)) for one in (seen, seen.mirrored()))
         back = seen.mirrored()
         back.local, back.root = other.local, other.root
         back = back.mirrored()
