@@ -12,6 +12,7 @@ from interpose.clip import Clip
 from interpose.finish import complete, feet, guarantees, measures
 from interpose.geometry import rotations
 from interpose.methods.classical import Linear
+from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import hips_of
 
@@ -111,6 +112,25 @@ def test_hips_sink_for_straight_legs_alone(standing):
     clip, known = keys(standing, 30, 0, 0.4)
     hips = filled(clip, known)[0].positions()[:, hips_of(standing.skeleton), 1]
     assert 0 <= hips[0] - hips.min() < 0.1
+
+
+def test_hips_that_went_along_for_other_steps_stay_over_the_feet(standing):
+    """A method that lets the body go half a metre aside and back, where the feet turn on the spot: the body
+    squatted for it."""
+    clip, known = keys(standing, 60, 90)
+
+    class Wandering(Linear):
+        def complete(self, clip, observation, seed=None):
+            done = super().complete(clip, observation).clip
+            translation = done.translation.copy()
+            translation[:, 0, 0] += 0.5 * np.sin(np.linspace(0, np.pi, len(done)))
+            return Raw(done.with_motion(done.rotation, translation))
+
+    done = complete(clip, known, Wandering())
+    assert guarantees.STEPS in done.report.gaps[0].notes
+    hips = done.clip.positions()[:, hips_of(standing.skeleton)]
+    assert hips[0, 1] - hips[:, 1].min() < 0.05
+    assert np.linalg.norm((hips - hips[0])[:, [0, 2]], axis=1).max() < 0.2
 
 
 def test_without_time_nobody_steps(standing):
