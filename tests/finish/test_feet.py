@@ -211,7 +211,7 @@ def test_stances_are_stiller_by_a_measure_that_lifting_cannot_better(walk, speak
     )
 
     held = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
-    monkeypatch.setattr(feet, "plant", lambda clip, *_: clip)
+    monkeypatch.setattr(feet, "plant", lambda clip, *_, **__: clip)
     loose = complete(walk, known, speaking(walk, sigma=0.03)).clip.positions()[:, joints]
     still, moving = (measures.stance_speed(p, planted, walk.fps) for p in (held, loose))
     assert still < 0.8 * moving
@@ -280,7 +280,9 @@ def test_ankle_and_toe_are_held_as_one_foot():
     planted = np.zeros((90, 2), bool)
     planted[5:60, 1] = planted[35:45, 0] = True
     movable = np.arange(90) >= 10
-    feet_held = glide + feet._hold(glide, planted, movable, 30.0, 4.5)
+    feet_held = glide + feet._hold(
+        glide, planted, measures.speed(glide, 30.0) < feet.STILL, movable, 30.0, 4.5
+    )
     np.testing.assert_allclose(feet_held[10:47, 1, 2], 0.15, atol=0.01)
     apart = np.linalg.norm(feet_held[:, 1] - feet_held[:, 0], axis=-1)
     assert np.abs(apart - 0.15).max() < 0.11
@@ -298,7 +300,7 @@ def test_a_long_way_to_where_a_foot_is_held_takes_longer(seam):
     planted = np.zeros((100, 2), bool)
     planted[20:] = True
     movable = (np.arange(100) >= seam) & (np.arange(100) < 80)
-    shift = feet._hold(glide, planted, movable, 30.0, 4.5)
+    shift = feet._hold(glide, planted, measures.speed(glide, 30.0) < feet.STILL, movable, 30.0, 4.5)
     np.testing.assert_allclose((glide + shift)[45:, :, 2], 0.0, atol=0.01)
     assert not shift[:seam].any()
     assert np.abs(np.diff(shift[..., 2], axis=0)).max() * 30 < 2.2 * feet.RUSH
@@ -314,6 +316,43 @@ def test_a_contact_of_one_frame_is_none(walk):
     without = feet.plant(slid, known, (45, 75), stands=stands)
     stands[56] = 0.9
     assert feet.plant(slid, known, (45, 75), stands=stands).rotation.tobytes() == without.rotation.tobytes()
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_a_foot_that_surely_stands_at_a_lone_key_stands_there_before(walk, sure):
+    """It comes to the key at .4 m/s, which has no speed of its own: held where the key has it, and not where
+    it is in the mean, if the method is sure that it stands."""
+    pose = walk.slice(64, 65)
+    glide = np.zeros((41, 1, 3))
+    glide[:, 0, 2] = np.interp(np.arange(41), [33, 40], [-0.4 * 7 / 30, 0.0])
+    clip = pose.with_motion(
+        np.repeat(pose.rotation, 41, axis=0), np.repeat(pose.translation, 41, axis=0) + glide
+    )
+    known = Observation.from_gaps(clip, [Gap(0, 40)])
+    held = feet.plant(clip, known, (0, 40), stands=np.full((41, 4), 0.95 if sure else 0.6))
+    [low, _] = sorted(feet.legs(clip.skeleton), key=lambda leg: clip.positions()[0, leg.toe, 1])
+    off = np.abs((held.positions() - held.positions()[40])[30:40, low.toe, 2]).max()
+    assert off < 0.01 if sure else off > 0.03
+
+
+def test_one_foot_is_held_if_the_other_one_is_better_off_as_it_is(walk, speaking, monkeypatch):
+    """Both were left to slide where holding them made the two slide more."""
+    known, held = gaps_of(walk, (40, 80)), feet.plant
+
+    def worse(clip, *rest, only=None, **options):
+        done = held(clip, *rest, only=only, **options)
+        if only != 0:
+            return done
+        shaken = np.where(known.frames, 0.0, 0.1 * (np.arange(len(clip)) % 2))
+        return done.with_motion(done.rotation, done.translation + shaken[:, None, None] * [1.0, 0.0, 0.0])
+
+    monkeypatch.setattr(feet, "plant", worse)
+    one = complete(walk, known, speaking(walk, sigma=0.03)).clip
+    monkeypatch.setattr(feet, "plant", lambda clip, *_, **__: clip)
+    none = complete(walk, known, speaking(walk, sigma=0.03)).clip
+    moved = np.abs(one.rotation - none.rotation).max(axis=(0, 2))
+    left, right = feet.legs(walk.skeleton)
+    assert moved[left.thigh] < 1e-4 < 1e-2 < moved[right.thigh]
 
 
 def test_a_stance_between_two_low_steps_is_one():

@@ -37,8 +37,9 @@ BLENDS = (0.15, 0.25, 0.40)
 # 6.3), with .02 by 6.5, 6.5 and 7.6. Joints are off by the same.
 OTHERS, KNOWING = (0.005, 0.03), (0.01, 0.025)
 QUICK = 0.50
-# A contact that the method takes for less likely than this is none.
-LIKELY = 0.5
+# A contact that the method takes for less likely than this is none; one that it takes for as likely as the
+# second stands at a lone key, too, which does not tell itself how fast anything is.
+LIKELY, SURE = 0.5, 0.8
 # Metres a second by which holding may speed a foot up between two contacts.
 LEAP = 1.5
 # Metres a second at which a shift comes and goes, at most, in the mean. In 411 fills of validation performers
@@ -300,6 +301,7 @@ def plant(
     stands: np.ndarray | None = None,
     step: float = STEP,
     lift: bool = True,
+    only: int | None = None,
 ) -> Clip:
     """Hold the feet during contacts in the span, and keep them above the floor.
 
@@ -316,6 +318,7 @@ def plant(
         step: metres; what moves further while it is slow and low is a step, and no stance.
         lift: whether feet are kept above the floor, and clear of it while they are quick; else they are held
             along it alone, and stay as high as they are.
+        only: the number of the leg in `legs` whose foot is held; else all are.
     """
     skeleton, over = clip.skeleton, max(2.0, blend * clip.fps)
     start, stop = span
@@ -334,14 +337,15 @@ def plant(
     inside[start:stop] = True
     for number, (leg, movable) in enumerate(zip(legs(skeleton), free)):
         movable = np.logical_and(movable, inside)
-        if not movable.any():
+        if not movable.any() or only not in (None, number):
             continue
         feet, floor = both[:, number], floors[:, number]
-        planted = contacts(feet, floor, clip.fps, step)
+        planted, still = contacts(feet, floor, clip.fps, step), measures.speed(feet, clip.fps) < STILL
         if stands is not None:
             said = stands[:, 2 * leg.side : 2 * leg.side + 2]
             planted = _lasting(planted & ~(said < LIKELY), clip.fps)
-        shift = _hold(feet, planted, movable, clip.fps, over)
+            still |= _lone(known.positions(skeleton)[:, leg.foot]) & (_beside(said) > SURE)
+        shift = _hold(feet, planted, still, movable, clip.fps, over)
         shift *= _let_go(leg, placed / grown, shift, over)[:, None, None]
         if lift:
             speeds = measures.speed(feet + shift, clip.fps)
@@ -356,18 +360,31 @@ def plant(
     return clip.with_motion(rotation, clip.translation)
 
 
-def _hold(feet: np.ndarray, planted: np.ndarray, movable: np.ndarray, fps: float, over: float) -> np.ndarray:
+def _lone(seen: np.ndarray) -> np.ndarray:
+    """(F, n) what is seen (F, n) in no frame beside."""
+    beside = np.pad(seen, ((1, 1), (0, 0)))
+    return seen & ~beside[:-2] & ~beside[2:]
+
+
+def _beside(said: np.ndarray) -> np.ndarray:
+    """(F, n) the larger of what is said (F, n) in the frames before and after; NaN where nothing is."""
+    padded = np.pad(said, ((1, 1), (0, 0)), constant_values=np.nan)
+    return np.asarray(np.fmax(padded[:-2], padded[2:]))
+
+
+def _hold(
+    feet: np.ndarray, planted: np.ndarray, still: np.ndarray, movable: np.ndarray, fps: float, over: float
+) -> np.ndarray:
     """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
 
-    feet: (F, 2, 3); planted: (F, 2); over: frames in which a shift comes and goes. A contact that stands in
-    observed frames is tied to where it is at the seam (between the two places, when it does so at both ends),
-    any other one is held at its mean. Outside of a contact a shift fades, and towards seams to which it is
-    not tied; where only one of the two joints is held, the other moves with it.
+    feet: (F, 2, 3); planted, still: (F, 2); over: frames in which a shift comes and goes. A contact that is
+    still in observed frames is tied to where it is at the seam (between the two places, when it is so at both
+    ends), any other one is held at its mean. Outside of a contact a shift fades, and towards seams to which
+    it is not tied; where only one of the two joints is held, the other moves with it.
     """
     frames = len(feet)
     blend = max(2, round(over))
     time = np.arange(frames)
-    still = measures.speed(feet, fps) < STILL
     both: list[list[Contact]] = []
     for joint in range(2):
         held: list[Contact] = []

@@ -309,28 +309,41 @@ def _step(current: Clip, known: Observation, span: Span) -> bool:
 def _plant(
     current: Clip, known: Observation, span: Span, bounds: jumps.Bounds | None, stands: np.ndarray | None
 ) -> None:
-    """Hold the feet of a span as firmly as they bear: with jumps that the observed motion has, too, or as
-    softly as possible with those that a gap may have at most."""
+    """Hold the feet of a span as firmly as they bear, one after the other: with jumps that the observed
+    motion has, too, or as softly as possible with those that a gap may have at most."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    loose, seen, frames = current.slice(lo, hi), known.slice(lo, hi), np.arange(*inner)
-    slide = feet.measure(loose, seen, *inner)
-    before = None if bounds is None else jumps.share(loose, seen, frames, bounds.peak)
-    chosen = None
+    done, seen = current.slice(lo, hi), known.slice(lo, hi)
+    usual = np.full(len(current.skeleton), jumps.SETS_OFF / current.fps**2)
+    peak = usual if bounds is None else bounds.peak
+    for leg in range(len(feet.legs(current.skeleton))):
+        done = _hold(done, seen, inner, leg, peak, None if stands is None else stands[lo:hi])
+    write(current, done, span.start, inner)
+
+
+def _hold(
+    loose: Clip,
+    seen: Observation,
+    inner: tuple[int, int],
+    leg: int,
+    peak: np.ndarray,
+    stands: np.ndarray | None,
+) -> Clip:
+    """A clip with one foot held in the frames `inner`, unless it would slide more, or joints jump further
+    than they may inside of gaps, `peak` (J,)."""
+    frames, slide = np.arange(*inner), feet.measure(loose, seen, *inner)
+    before = jumps.share(loose, seen, frames, peak)
+    chosen = loose
     for blend in feet.BLENDS:
-        held = feet.plant(loose, seen, inner, blend, None if stands is None else stands[lo:hi])
+        held = feet.plant(loose, seen, inner, blend, stands, only=leg)
         slides = feet.measure(held, seen, *inner)
         if slide is None or slides is None or slides[0] > slide[0]:
             break  # holding feet made them slide: it was about something else than stances
-        if bounds is None or before is None:
-            chosen = held
-            break
-        jump = jumps.share(held, seen, frames, bounds.peak)
+        jump = jumps.share(held, seen, frames, peak)
         if jump <= max(1.0, before):
             chosen = held
         if jump <= max(1 / seams.OWN_PEAKS, before):
             break
-    if chosen is not None:
-        write(current, chosen, span.start, inner)
+    return chosen
 
 
 def _verify(finished: Clip, clip: Clip, known: Observation) -> None:
