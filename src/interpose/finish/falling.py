@@ -62,7 +62,11 @@ def landed(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     lands = int(np.argmax(over >= clear)) if (over >= clear).any() else len(time)
     if over[:lands].max(initial=0.0) < HOVERS:
         return clip
-    down, since = np.minimum(over, clear), np.maximum(time - 1 - lands, 0) / fps
+    # It lands between two frames, and gives way from then on: else it would stop for one.
+    early = 0.0
+    if 0 < lands < len(time):
+        early = float(np.clip((over - clear)[lands] / max(over[lands] - over[lands - 1], 1e-9), 0.0, 1.0))
+    down, since = np.minimum(over, clear), np.maximum(time - 1 - lands + early, 0) / fps
     if lands < len(time):
         # On the floor it stays: what the method does above it, it does on it.
         stays = ndimage.minimum_filter1d(clear, 2 * round(STEPS * fps) + 1)
