@@ -355,6 +355,22 @@ def test_one_foot_is_held_if_the_other_one_is_better_off_as_it_is(walk, speaking
     assert moved[left.thigh] < 1e-4 < 1e-2 < moved[right.thigh]
 
 
+def test_feet_that_are_dragged_through_a_gap_step_as_they_do_beside_it(walk):
+    known, gap = gaps_of(walk, (35, 90)), slice(35, 90)
+    turned, placed = walk.kinematics()
+    rotation, dragged = walk.rotation.copy(), placed[:, feet.pairs(walk.skeleton)]
+    lowest = dragged[..., 1].min(axis=0)
+    dragged[..., 1] = np.minimum(dragged[..., 1], lowest + 0.01)
+    for number, leg in enumerate(feet.legs(walk.skeleton)):
+        parts = (some[gap] for some in (rotation, turned, placed, dragged[:, number]))
+        rotation[gap] = feet.reach(walk.skeleton, leg, *parts)
+    low = walk.with_motion(rotation, walk.translation)
+    toes = [leg.toe for leg in feet.legs(walk.skeleton)]
+    done = feet.plant(low, known, (35, 90), stands=np.full((120, 4), np.nan))
+    before, after = ((one.positions()[gap, toes, 1] - lowest[:, 1]).max() for one in (low, done))
+    assert before < 0.035 < 0.06 < after
+
+
 def test_a_stance_between_two_low_steps_is_one():
     """A foot that shuffles on at .8 m/s, stands half a second, and shuffles on: never fast, never high."""
     speed = np.repeat([0.8, 0.0, 0.8], [25, 15, 25]) / 30

@@ -13,6 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish import measures
+from interpose.finish.swings import lifts
 from interpose.finish.windows import envelope, ramp, rounded, spread
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
@@ -352,6 +353,8 @@ def plant(
             lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
             raised = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
             shift[..., 1] += (raised * np.prod(envelope(movable, over), axis=0))[:, None]
+            seen = np.asarray(known.positions(skeleton)[:, leg.foot].all(axis=1))
+            shift[..., 1] += lifts(feet + shift, floor, planted, seen, movable)[:, None]
         moved = np.flatnonzero(np.abs(shift).max(axis=(1, 2)) > 1e-9)
         if moved.size:
             rotation[moved] = reach(
