@@ -64,6 +64,33 @@ def skeletons(
 
 
 @bench.command
+def artefacts(
+    *,
+    methods: list[str] = [],  # noqa: B006
+    most: Most = 20,
+    asked: Tabled = Tabled(),
+) -> None:
+    """What an animator would send back: snaps, scuffing, squats, drifting feet, gliding or frozen bodies.
+
+    Shares of finished fills, beside what people do in the same frames themselves.
+
+    Try:
+      interpose bench artefacts --data data
+      interpose bench artefacts --data data --methods cmib,base --most 60
+
+    Args:
+        methods: names separated by commas; spline, small and base without it.
+        most: windows of each data set.
+    """
+    from interpose.cli.reading import split_names
+    from interpose.evaluation.artefacts import METHODS, run
+
+    with bar() as progress:
+        result = run(asked.data, split_names(methods) or METHODS, asked.split, most, progress)
+    show(result, asked)
+
+
+@bench.command
 def context(
     *,
     most: Most = 6,
