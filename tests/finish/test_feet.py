@@ -235,6 +235,28 @@ def test_a_foot_lets_go_before_its_leg_is_straight(cmu_walk):
     assert np.abs(np.diff(share)).max() < 0.5
 
 
+def test_a_leg_that_pushes_off_lifts_its_heel_for_its_toe_to_stay(cmu_walk):
+    """As long as the hips are beyond the toe: the foot stays as long as it is, the knee as bent as it was."""
+    placed = cmu_walk.positions()
+    for leg in feet.legs(cmu_walk.skeleton):
+        hip, ankle, toe = (placed[:, joint] for joint in (leg.thigh, *leg.foot))
+        on = ((hip - toe) * (toe - ankle) * [1, 0, 1]).sum(axis=1)
+        back = np.where(np.arange(3) == 1, 0.0, ankle - toe)
+        back *= 0.06 / np.linalg.norm(back, axis=1, keepdims=True)
+        shift = np.stack([back, back], axis=1)
+        up = feet._heel_up(leg, placed, shift)
+        now, goal, stays = ankle + shift[:, 0], ankle + shift[:, 0] + up, toe + shift[:, 1]
+        np.testing.assert_allclose(*(np.linalg.norm(some - stays, axis=1) for some in (goal, now)), atol=1e-9)
+        assert np.abs(up[on < -0.02]).max() < 1e-9, "heels land first"
+        pushes = on > 0.02
+        asked, less, own = (np.linalg.norm(some - hip, axis=1)[pushes] for some in (now, goal, ankle))
+        further = asked > own + 0.02
+        assert further.sum() >= 10
+        np.testing.assert_allclose(less[further], own[further], atol=0.01)
+        assert (up[pushes][further, 1] > 0).all()
+        np.testing.assert_allclose(feet._heel_up(leg, placed, 0 * shift), 0.0, atol=1e-9)
+
+
 def test_a_foot_that_swivels_is_not_led_through_itself(walk):
     """Who turns half round on the spot in a second, without a step: ankle and toe stand at both ends, and
     straight ways from there to there cross."""
