@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from interpose.clip import Clip
-from interpose.finish import complete, feet, measures, notes
+from interpose.finish import complete, feet, guarantees, measures, notes
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -375,6 +375,35 @@ def test_one_foot_is_held_if_the_other_one_is_better_off_as_it_is(walk, speaking
     moved = np.abs(one.rotation - none.rotation).max(axis=(0, 2))
     left, right = feet.legs(walk.skeleton)
     assert moved[left.thigh] < 1e-4 < 1e-2 < moved[right.thigh]
+
+
+def test_a_foot_is_held_more_softly_where_its_leg_jumps_further_than_legs_do(walk, monkeypatch):
+    """Though it does not jump as far as it may in any gap: firmly held, a thigh is torn aside for a frame."""
+    known, held = gaps_of(walk, (40, 80)), feet.plant
+    leg, anything = feet.legs(walk.skeleton)[0], np.full(len(walk.skeleton), 1.0)
+    usual = guarantees._usual(walk, known, anything)
+    jumps = [
+        measures.acceleration(walk.positions()[:, side.knee])[:38].max() for side in feet.legs(walk.skeleton)
+    ]
+    assert usual[leg.knee] >= max(*jumps, guarantees.STEADY / walk.fps**2) > usual[leg.knee] - 5 / walk.fps**2
+    assert np.isinf(usual[0])
+    tried = {}
+
+    def tearing(clip, seen, span, blend, *rest, **options):
+        done = held(clip, seen, span, blend, *rest, **options)
+        rotation = done.rotation.copy()
+        aside = rotations.exp(np.array([0.05 if blend == feet.BLENDS[0] else 0.001, 0.0, 0.0]))
+        rotation[60, leg.thigh] = rotations.multiply(rotation[60, leg.thigh], aside)
+        tried[blend] = done.with_motion(rotation, done.translation)
+        return tried[blend]
+
+    monkeypatch.setattr(feet, "plant", tearing)
+    monkeypatch.setattr(feet, "measure", lambda *_: (1.0, 1.0))
+    assert guarantees._hold(walk, known, (40, 80), 0, anything, usual, None) is tried[feet.BLENDS[1]]
+    assert list(tried) == list(feet.BLENDS[:2])
+    tried.clear()
+    guarantees._hold(walk, known, (40, 80), 0, anything, anything, None)
+    assert list(tried) == [feet.BLENDS[0]], "where legs jump as far nearby it is held firmly"
 
 
 def test_feet_that_are_dragged_through_a_gap_step_as_they_do_beside_it(walk):
