@@ -105,6 +105,7 @@ def test_the_javascript_of_the_docs_fills_a_character_as_python_does(cmu_walk, t
         local,
         body.root(part) * body.scale,
         known,
+        np.ones(len(PARENTS) + 1, bool),
         ("", ""),
         body.bones * body.scale,
         nothing,

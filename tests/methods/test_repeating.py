@@ -1,0 +1,153 @@
+"""What repeats itself around a gap repeats itself in it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from interpose.geometry import rotations
+from interpose.methods import repeating
+from interpose.methods.repeating import Motion
+from interpose.skeletons import BONES, JOINTS
+
+FRAMES, HOLE = 240, (100, 145)
+
+
+def walking(period: float | np.ndarray = 31.0, turns: float = 0.0) -> Motion:
+    """Arms and legs that swing to and fro, in so many frames (which may change: (F,)), of a body that goes
+    ahead, and turns by so many radians a frame."""
+    time = np.arange(FRAMES)
+    phase = 2 * np.pi * np.cumsum(np.broadcast_to(1 / np.asarray(period), FRAMES))
+    local = np.tile(rotations.identity(len(JOINTS)), (FRAMES, 1, 1))
+    for name, axis, swing, late in (
+        ("LeftArm", "Z", 0.5, 0.0),
+        ("LeftForeArm", "Y", 0.2, 0.4),
+        ("RightArm", "Z", 0.5, np.pi),
+        ("LeftUpLeg", "X", 0.4, np.pi),
+        ("RightUpLeg", "X", 0.4, 0.0),
+        ("RightLeg", "X", 0.3, 0.3),
+    ):
+        local[:, JOINTS.index(name)] = rotations.about(axis, swing * np.sin(phase + late))
+    yaw = turns * time
+    local[:, 0] = rotations.about("Y", yaw)
+    ahead = np.stack([np.sin(yaw), np.zeros(FRAMES), np.cos(yaw)], axis=1)
+    root = np.cumsum(0.04 * ahead, axis=0)
+    root[:, 1] = 0.9
+    return Motion(local, root)
+
+
+def known(hole: tuple[int, int] = HOLE) -> np.ndarray:
+    told = np.ones((FRAMES, 23), bool)
+    told[slice(*hole)] = False
+    return told
+
+
+def frozen(motion: Motion, hole: tuple[int, int] = HOLE) -> Motion:
+    """What a network says that knows nothing: limbs hang in the hole, and the body goes its way."""
+    local = motion.local.copy()
+    local[slice(*hole), 1:] = rotations.identity(len(JOINTS) - 1)
+    return Motion(local, motion.root.copy())
+
+
+def off(one: Motion, other: Motion, names: str, hole: tuple[int, int] = HOLE) -> float:
+    rows = [row for row, name in enumerate(JOINTS) if names in name]
+    return float(rotations.angle(one.local[slice(*hole), rows], other.local[slice(*hole), rows]).mean())
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.01])
+def test_arms_and_legs_swing_on(turns):
+    truth = walking(turns=turns)
+    said = frozen(truth)
+    done = repeating.carried_on(truth, known(), said, BONES)
+    # The network's word counts for the rest.
+    for names, part in (("Arm", repeating.ARMS[0]), ("Leg", repeating.BODY)):
+        assert off(done, truth, names) < (1.05 - part.share) * off(said, truth, names)
+    assert np.allclose(done.root, said.root), "between known sides the way is the network's"
+    outside = known().all(axis=1)
+    assert (done.local[outside] == said.local[outside]).all()
+
+
+def test_a_rhythm_that_quickens_fits_both_sides():
+    truth = walking(np.interp(np.arange(FRAMES), [90, 150], [34.0, 31.0]))
+    rhythm = repeating.find(
+        *(truth.local[part].reshape(-1, 88) for part in (slice(100), slice(145, None))), 45, 0.9
+    )
+    assert rhythm is not None
+    assert [rhythm.before, rhythm.after] == pytest.approx([34, 31], abs=0.5)
+    assert rhythm.inside == pytest.approx(32.5, abs=0.7)
+    said = frozen(truth)
+    done = repeating.carried_on(truth, known(), said, BONES)
+    assert off(done, truth, "Arm") < 0.3 * off(said, truth, "Arm")
+
+
+def test_what_does_not_repeat_itself_is_the_networks():
+    rng = np.random.default_rng(0)
+    wander = walking()
+    wander.local[:, 1:] = rotations.exp(
+        np.cumsum(0.05 * rng.normal(size=(FRAMES, len(JOINTS) - 1, 3)), axis=0)
+    )
+    still = walking()
+    still.local[:, 1:] = rotations.identity(len(JOINTS) - 1)
+    uneven = Motion(np.concatenate([walking(31.0).local[:120], walking(45.0).local[120:]]), walking().root)
+    for seen in (wander, still, uneven):
+        said = frozen(seen)
+        done = repeating.carried_on(seen, known(), said, BONES)
+        assert (done.local == said.local).all()
+        assert (done.root == said.root).all()
+
+
+def test_part_of_a_pose_and_what_lies_beside_it_are_left_alone():
+    truth, some = walking(), known()
+    said = frozen(truth)
+    some[120:125, 5] = True
+    beside = known()
+    beside[95:100, 5] = False
+    for told in (some, beside):
+        done = repeating.carried_on(truth, told, said, BONES)
+        assert (done.local[95:100] == said.local[95:100]).all()
+        assert (done.local[HOLE[0] : 120] == said.local[HOLE[0] : 120]).all()
+
+
+def test_nothing_unknown_is_looked_at():
+    truth = walking()
+    said = frozen(truth)
+    done = repeating.carried_on(truth, known(), said, BONES)
+    other = Motion(truth.local.copy(), truth.root.copy())
+    other.local[slice(*HOLE)] = rotations.identity(len(JOINTS))
+    other.root[slice(*HOLE)] = 1e3
+    again = repeating.carried_on(other, known(), said, BONES)
+    assert (again.local == done.local).all()
+    assert (again.root == done.root).all()
+
+
+@pytest.mark.parametrize("turns", [0.0, 0.02])
+def test_who_walks_out_of_a_clip_walks_on(turns):
+    """Where the network lets him stand; ever more as he did. Seen from elsewhere it is the same."""
+    truth, hole = walking(turns=turns), (180, 240)
+    said = frozen(truth, hole)
+    said.root[180:] = truth.root[179]
+    said.local[180:, 0] = truth.local[179, 0]
+    done = repeating.carried_on(truth, known(hole=hole), said, BONES)
+    pace = np.linalg.norm(np.diff(done.root[179:], axis=0), axis=1) / 0.04
+    assert pace[0] == pytest.approx(repeating.BODY.share, abs=0.02)
+    assert np.allclose(pace[repeating.ALONE :], 1.0, atol=0.05)
+    turned = rotations.about("Y", np.array([2.0]))
+
+    def elsewhere(motion: Motion) -> Motion:
+        local = motion.local.copy()
+        local[:, 0] = rotations.multiply(turned, local[:, 0])
+        return Motion(local, rotations.rotate(turned, motion.root))
+
+    there = repeating.carried_on(elsewhere(truth), known(hole=hole), elsewhere(said), BONES)
+    assert np.allclose(there.root, elsewhere(done).root, atol=1e-9)
+    assert rotations.angle(there.local, elsewhere(done).local).max() < 1e-6
+
+
+def test_what_comes_before_a_clip_is_what_goes_on_backwards():
+    truth, hole = walking(), (180, 240)
+    said, told = frozen(truth, hole), known(hole=hole)
+    done = repeating.carried_on(truth, told, said, BONES)
+    back = slice(None, None, -1)
+    before = repeating.carried_on(truth.part(back), told[::-1], said.part(back), BONES)
+    assert (before.local == done.local[::-1]).all()
+    assert off(done, truth, "Arm", hole) < 0.25 * off(said, truth, "Arm", hole)
