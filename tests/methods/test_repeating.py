@@ -80,6 +80,18 @@ def test_a_rhythm_that_quickens_fits_both_sides():
     assert off(done, truth, "Arm") < 0.3 * off(said, truth, "Arm")
 
 
+def test_who_has_just_raised_his_arm_waves_on():
+    """The whole second before he waved does not repeat itself; what is nearest does."""
+    truth = walking()
+    arms = [row for row, name in enumerate(JOINTS) if "Arm" in name]
+    truth.local[:45, arms] = truth.local[45:46, arms]
+    raised = rotations.about("Z", np.interp(np.arange(FRAMES), [0, 45], [-1.5, 0.0]))
+    truth.local[:, arms[0]] = rotations.multiply(raised, truth.local[:, arms[0]])
+    said = frozen(truth)
+    done = repeating.carried_on(truth, known(), said, BONES)
+    assert off(done, truth, "Arm") < 0.3 * off(said, truth, "Arm")
+
+
 def test_what_does_not_repeat_itself_is_the_networks():
     rng = np.random.default_rng(0)
     wander = walking()

@@ -17,9 +17,10 @@ from interpose.geometry.time import ease, runs, sample, sample_rotations
 from interpose.geometry.values import moved, offset
 from interpose.skeletons import JOINTS, PARENTS
 
-# Frames at 30 fps: of known motion on each side that are looked at, and what a repetition takes, at least and
-# at most. So many times as much is to be known of it.
-LOOK, SHORTEST, LONGEST, TIMES = 120, 8, 50, 1.4
+# Frames at 30 fps: of known motion on each side that are looked at, fewer where nothing repeats itself in
+# more (who waves has raised his arm before); and what a repetition takes, at least and at most. So many times
+# as much is to be known of it.
+LOOKS, SHORTEST, LONGEST, TIMES = (120, 75, 50), 8, 50, 1.4
 # By what share periods may differ from side to side, and from the one in the hole that fits both.
 UNEVEN, STRETCHED = 0.2, 0.15
 # Metres that joints are from where they are in the mean, of what stirs at all; and how much less alike a
@@ -135,8 +136,8 @@ def carried_on(seen: Motion, known: np.ndarray, said: Motion, bones: np.ndarray)
 
 
 def _lasting(flags: np.ndarray) -> int:
-    """How many flags are True before the first that is not; LOOK at most."""
-    return int(np.logical_and.accumulate(flags[:LOOK]).sum())
+    """How many flags are True before the first that is not, of as many as are looked at."""
+    return int(np.logical_and.accumulate(flags[: LOOKS[0]]).sum())
 
 
 def _carried(seen: Motion, said: Motion, hole: tuple[int, int], bones: np.ndarray) -> Motion:
@@ -210,10 +211,10 @@ def _way(seen: Motion, yaw: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.
 def find(before: np.ndarray, after: np.ndarray | None, length: int, alike: float) -> Rhythm | None:
     """How poses (n, d) before and after a hole of so many frames repeat themselves, if they are as much
     alike, and what is after repeats what is before."""
-    first = _period(before, alike)
+    first = _nearby(before[::-1], alike)
     if first is None or after is None:
         return None if first is None else Rhythm(first, None, first)
-    last = _period(after, alike)
+    last = _nearby(after, alike)
     if last is None or abs(first - last) > UNEVEN * min(first, last):
         return None
     period = (first + last) / 2
@@ -225,6 +226,12 @@ def find(before: np.ndarray, after: np.ndarray | None, length: int, alike: float
     lag = float(lags[int(np.argmax(told))])
     inside = lag / max(round(lag / period), 1)
     return Rhythm(first, last, inside) if abs(inside - period) < STRETCHED * period else None
+
+
+def _nearby(poses: np.ndarray, alike: float) -> float | None:
+    """`_period` of as many poses (n, d) as repeat themselves, the nearest first."""
+    found = (_period(poses[:look], alike) for look in LOOKS if look == LOOKS[0] or look < len(poses))
+    return next((period for period in found if period is not None), None)
 
 
 def _period(poses: np.ndarray, alike: float) -> float | None:
