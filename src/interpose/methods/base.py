@@ -147,7 +147,7 @@ class Base:
         answer = run_long(cards, seen)
         said = repeating.Motion(answer.local, answer.root)
         held = repeating.Motion(seen.local, seen.root)
-        on = repeating.carried_on(held, seen.known[:, seen.has], said, bones)
+        on, periods = repeating.carried_on(held, seen.known[:, seen.has], said, bones)
         answer.local, answer.root = on.local, on.root
         changes = np.flatnonzero((seen.known[1:] != seen.known[:-1]).any(axis=1)) + 1
         answer.local = joined(answer.local, seen.known[:, :-1], changes, card.fps)
@@ -164,7 +164,14 @@ class Base:
         stands, expected = np.full((len(clip), len(FEET)), np.nan), np.full(len(clip), np.nan)
         stands[missing] = sample(answer.stands, back)
         expected[missing] = sample(answer.expected[:, None], back)[:, 0] / body.scale
-        return Raw(done, notes=weights.told(*cards), stands=stands, expected=expected)
+        remarks = {}
+        for gap in observation.gaps(clip.skeleton):
+            for (start, stop), period in periods.items():
+                if times[start] <= (gap.start + gap.stop - 1) / 2 <= times[stop - 1]:
+                    every = f"{period / card.fps:.1f} s"
+                    remarks[f"{gap.start}:{gap.stop}"] = [f"what repeats itself every {every} goes on in it"]
+        notes = {**weights.told(*cards), "remarks": remarks}
+        return Raw(done, notes=notes, stands=stands, expected=expected)
 
 
 @dataclass

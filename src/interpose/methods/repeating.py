@@ -111,15 +111,21 @@ class Motion:
         return Motion(self.local[frames], self.root[frames])
 
 
-def carried_on(seen: Motion, known: np.ndarray, said: Motion, bones: np.ndarray) -> Motion:
+def carried_on(
+    seen: Motion, known: np.ndarray, said: Motion, bones: np.ndarray
+) -> tuple[Motion, dict[tuple[int, int], float]]:
     """What a network says, with what repeats itself around holes of the whole pose carried on in them.
 
     Args:
         seen: the motion; known: (T, n) what is known of what the skeleton has of it.
         said: all of it, by the network.
         bones: (22, 3) metres.
+
+    Returns:
+        The motion, and for each hole (start to stop - 1) in which something was, the frames that it takes.
     """
     whole, done = np.asarray(known.all(axis=1)), Motion(said.local.copy(), said.root.copy())
+    periods = {}
     for begin, end in runs(np.logical_not(known.any(axis=1))):
         first, last = begin - _lasting(whole[:begin][::-1]), end + _lasting(whole[end:])
         if (first == begin > 0) or (last == end < len(whole)):
@@ -128,11 +134,14 @@ def carried_on(seen: Motion, known: np.ndarray, said: Motion, bones: np.ndarray)
         if begin == 0:  # what goes on so had been going on so before
             back = slice(None, None, -1)
             around, inside, hole = around.part(back), inside.part(back), (last - end, last - begin)
-            carried = _carried(around, inside, hole, bones).part(back)
+            carried, period = _carried(around, inside, hole, bones)
+            carried = carried.part(back)
         else:
-            carried = _carried(around, inside, (begin - first, end - first), bones)
-        done.local[begin:end], done.root[begin:end] = carried.local, carried.root
-    return done
+            carried, period = _carried(around, inside, (begin - first, end - first), bones)
+        if period is not None:
+            done.local[begin:end], done.root[begin:end] = carried.local, carried.root
+            periods[begin, end] = period
+    return done, periods
 
 
 def _lasting(flags: np.ndarray) -> int:
@@ -140,9 +149,12 @@ def _lasting(flags: np.ndarray) -> int:
     return int(np.logical_and.accumulate(flags[: LOOKS[0]]).sum())
 
 
-def _carried(seen: Motion, said: Motion, hole: tuple[int, int], bones: np.ndarray) -> Motion:
-    """What is said of a hole (n frames) with what repeats itself around it, in all other frames of `seen`."""
-    begin, end = hole
+def _carried(
+    seen: Motion, said: Motion, hole: tuple[int, int], bones: np.ndarray
+) -> tuple[Motion, float | None]:
+    """What is said of a hole (n frames) with what repeats itself around it, in all other frames of `seen`;
+    and the frames that a repetition takes, None without any."""
+    (begin, end), period = hole, None
     yaw, local = heading(seen.local), seen.local.copy()
     local[:, 0] = rotations.multiply(rotations.about("Y", -yaw), local[:, 0])
     there, turned, root = heading(said.local), said.local.copy(), said.root
@@ -152,6 +164,7 @@ def _carried(seen: Motion, said: Motion, hole: tuple[int, int], bones: np.ndarra
         rhythm = find(poses[:begin], poses[end:] if end < len(poses) else None, end - begin, part.alike)
         if rhythm is None:
             continue
+        period = rhythm.inside
         sources, share = rhythm.sources(begin, end), np.full(end - begin, part.share)
         if rhythm.after is None:
             # The further it goes the less the network knows, and the mean of two that stray is no step.
@@ -165,7 +178,7 @@ def _carried(seen: Motion, said: Motion, hole: tuple[int, int], bones: np.ndarra
             root = seen.root[begin - 1] + np.cumsum(steps[0] + share[:, None] * (steps[1] - steps[0]), axis=0)
             there = there + share * _wrapped(turns - there)
     turned[:, 0] = rotations.multiply(rotations.about("Y", there), turned[:, 0])
-    return Motion(turned, root)
+    return Motion(turned, root), period
 
 
 def heading(local: np.ndarray) -> np.ndarray:
