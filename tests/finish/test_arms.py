@@ -42,7 +42,7 @@ def test_two_arms_are_found(cmu_walk):
 
 def test_a_hand_that_turns_back_at_once_is_led_round(jerky, cmu_walk):
     known = Observation.from_gaps(jerky, [GAP])
-    done = arms.steadied(jerky, known, (GAP.start, GAP.stop))
+    done = arms.steadied(jerky, known, known, (GAP.start, GAP.stop))
     usual = max(arms.LEAST, arms.OWN * 900 * arms._usual(jerky, known))
     assert jumps(jerky)[0] > 1.5 * usual
     assert jumps(done)[0] <= usual
@@ -50,14 +50,14 @@ def test_a_hand_that_turns_back_at_once_is_led_round(jerky, cmu_walk):
     assert {jerky.skeleton.names[j] for j in np.flatnonzero(moved)} <= {"LeftArm", "LeftForeArm"}
     seen = np.asarray(known.frames)
     assert (done.rotation[seen] == jerky.rotation[seen]).all()
-    still = arms.steadied(cmu_walk, known, (GAP.start, GAP.stop))
+    still = arms.steadied(cmu_walk, known, known, (GAP.start, GAP.stop))
     assert still is cmu_walk, "people's own arms are left alone"
 
 
 def test_an_arm_of_which_something_is_known_is_left_alone(jerky):
     known = Observation.from_gaps(jerky, [GAP])
     known.rotation[100, jerky.skeleton.index("LeftForeArm")] = True
-    assert arms.steadied(jerky, known, (GAP.start, GAP.stop)) is jerky
+    assert arms.steadied(jerky, known, known, (GAP.start, GAP.stop)) is jerky
 
 
 def test_hands_that_jump_as_far_nearby_may(jerky):
@@ -67,7 +67,7 @@ def test_hands_that_jump_as_far_nearby_may(jerky):
     rotation = jerky.rotation.copy()
     rotation[60, right] = rotations.multiply(rotation[60, right], rotations.exp(np.array([0.0, 0.0, 0.3])))
     wild = jerky.with_motion(rotation, jerky.translation)
-    assert arms.steadied(wild, known, (GAP.start, GAP.stop)) is wild
+    assert arms.steadied(wild, known, known, (GAP.start, GAP.stop)) is wild
 
 
 def test_between_lone_keys_hands_turn_back_as_they_may_anywhere(jerky):
@@ -75,6 +75,24 @@ def test_between_lone_keys_hands_turn_back_as_they_may_anywhere(jerky):
     known = Observation.from_gaps(part, [Gap(1, len(part) - 1)])
     assert arms._usual(part, known) is None
     before = max(arms._jumps(part, arm).max() for arm in arms.arms(part.skeleton)) * part.fps**2
-    done = arms.steadied(part, known, (1, len(part) - 1))
+    done = arms.steadied(part, known, known, (1, len(part) - 1))
     after = max(arms._jumps(done, arm).max() for arm in arms.arms(part.skeleton)) * part.fps**2
     assert after <= arms.UNTOLD < before
+
+
+def test_what_never_turns_is_no_reason_to_leave_an_arm_alone(jerky):
+    """Rolls of forearms that were never captured are firm, but tell nothing."""
+    known = Observation.from_gaps(jerky, [GAP])
+    firm = Observation(known.rotation.copy(), known.translation)
+    firm.rotation[:, jerky.skeleton.index("LeftForeArm")] = True
+    done = arms.steadied(jerky, known, firm, (GAP.start, GAP.stop))
+    assert jumps(done)[0] < 0.7 * jumps(jerky)[0]
+    moved = (done.rotation != jerky.rotation).any(axis=(0, 2))
+    assert [jerky.skeleton.names[j] for j in np.flatnonzero(moved)] == ["LeftArm"]
+
+
+def test_an_arm_that_is_known_nowhere_does_not_go_to_rest(jerky):
+    part = jerky.slice(98, 103)
+    known = Observation.full(part)
+    known.rotation[:, list(arms.arms(part.skeleton)[0].chain)] = False
+    assert arms.steadied(part, known, known, (0, len(part))) is part

@@ -44,9 +44,12 @@ def arms(skeleton: Skeleton) -> list[Arm]:
     return found
 
 
-def steadied(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
-    """A motion with arms led by a spline where their hands jump, in frames start to stop - 1 of a span, or
-    beside it, as they do nowhere nearby; an arm of which something is known in the span is left alone."""
+def steadied(clip: Clip, known: Observation, firm: Observation, span: tuple[int, int]) -> Clip:
+    """A motion with arms led by a spline, within a span of frames start to stop - 1, where their hands jump
+    there or beside it as they do nowhere nearby; an arm of which something is known in it is left alone.
+
+    firm: what is known, and joints that never turn.
+    """
     start, stop = span
     chosen = [arm for arm in arms(clip.skeleton) if not known.rotation[start:stop, list(arm.chain)].any()]
     if not chosen:
@@ -60,7 +63,7 @@ def steadied(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
             worst = _worst(jumps, (start, stop))
             if jumps[worst] <= most:
                 break
-            led, jump = _led(clip, known, arm, (start, stop), worst, most)
+            led, jump = _led(clip, firm, arm, (start, stop), worst, most)
             if jump >= jumps[worst]:
                 break
             clip = led
@@ -90,17 +93,19 @@ def _worst(jumps: np.ndarray, part: tuple[int, int]) -> int:
 
 
 def _led(
-    clip: Clip, known: Observation, arm: Arm, span: tuple[int, int], worst: int, most: float
+    clip: Clip, firm: Observation, arm: Arm, span: tuple[int, int], worst: int, most: float
 ) -> tuple[Clip, float]:
     """The clip with a spline that leads an arm around the frame at which its hand jumps worst, over as few
     frames as bring that below `most`, or else those with which it jumps least; and how far it does there."""
-    found = []
+    found = [(clip, np.inf)]
     for seconds in MENDS:
         half = max(1, round(seconds * clip.fps))
         part = max(span[0], worst - half), min(span[1], worst + half + 1)
-        free = np.zeros_like(known.rotation)
+        if part == (0, len(clip)):
+            break  # nothing is left to start from
+        free = np.zeros_like(firm.rotation)
         free[slice(*part), list(arm.chain)] = True
-        led = Spline().complete(clip, Observation(~free, np.ones_like(free))).clip
+        led = Spline().complete(clip, Observation(~free | firm.rotation, np.ones_like(free))).clip
         jumps = _jumps(led, arm)
         found.append((led, float(jumps[_worst(jumps, part)])))
         if found[-1][1] <= most:

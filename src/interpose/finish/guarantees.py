@@ -150,7 +150,7 @@ class _Work:
             _fade(current, source, self.hidden, self.firm, span)
             if not (layer and layer.pins):
                 anatomy.calm(current, self.firm, span)
-                _steady(current, self.firm, span)
+                _steady(current, self.known, self.firm, span)
             places = jumps.mend(current, self.firm, span, self.bounds)
             if own:
                 self.mended[span.start] = places
@@ -290,10 +290,11 @@ def _fade(current: Clip, source: Clip, hidden: Clip, known: Observation, span: S
         write(current, merge(seams.fade(raw, base, seen, inner), base, seen), span.start, inner)
 
 
-def _steady(current: Clip, known: Observation, span: Span) -> None:
+def _steady(current: Clip, known: Observation, firm: Observation, span: Span) -> None:
     """Let a spline lead arms over frames of a span in which their hands jump."""
     lo, hi, inner = span.around(len(current), round(arms.NEARBY * current.fps))
-    write(current, arms.steadied(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
+    led = arms.steadied(current.slice(lo, hi), known.slice(lo, hi), firm.slice(lo, hi), inner)
+    write(current, led, span.start, inner)
 
 
 def _land(current: Clip, known: Observation, span: Span) -> None:
@@ -320,12 +321,12 @@ def _step(current: Clip, known: Observation, span: Span) -> bool:
 def _plant(
     current: Clip, known: Observation, span: Span, bounds: jumps.Bounds | None, stands: np.ndarray | None
 ) -> None:
-    """Hold the feet of a span as firmly as they bear, one after the other: with jumps that the observed
-    motion has, too, or as softly as possible with those that a gap may have at most."""
+    """Hold the feet of a span, one after the other: as firmly as its legs jump no further than legs do in the
+    observed motion, or so that they jump least."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
     done, seen = current.slice(lo, hi), known.slice(lo, hi)
-    usual = np.full(len(current.skeleton), jumps.SETS_OFF / current.fps**2)
-    peak = usual if bounds is None else bounds.peak
+    anywhere = np.full(len(current.skeleton), jumps.SETS_OFF / current.fps**2)
+    peak = anywhere if bounds is None else bounds.peak
     usual = _usual(done, seen, peak)
     for leg in range(len(feet.legs(current.skeleton))):
         done = _hold(done, seen, inner, leg, peak, usual, None if stands is None else stands[lo:hi])

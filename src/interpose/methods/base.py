@@ -68,10 +68,6 @@ BESIDE = 2 / 3
 # windows of LAFAN1's validation performer), and at 97, 96 and 86 % so. They are off by 1 % less, 1 less, and
 # as much.
 THROUGH = 0.1
-# What a skeleton lacks counts as known, so that a hole of it between known sides is none of the whole pose:
-# gaps of 2 and 3 s on Bandai-Namco's (no middle joint of the spine) are off by 1.9 and 2.3 cm so, by 2.2 and
-# 3.0 if filled as others' are. Not so at ends of clips: bodies glided in 5 % of the frames of forecasts of
-# 2 s (now in .6 %), and scuffed in a fifth of what led up to a clip.
 COLUMNS = len(PARENTS) + 1  # what can be known in a frame: a rotation for each joint, and where the hips are
 
 
@@ -147,7 +143,9 @@ class Base:
         answer = run_long(cards, seen)
         said = repeating.Motion(answer.local, answer.root)
         held = repeating.Motion(seen.local, seen.root)
-        on, periods = repeating.carried_on(held, seen.known[:, seen.has], said, bones)
+        told = seen.known[:, seen.has]
+        told[seen.pins.any(axis=1), 0] = True  # where it is to be there is more to it than that
+        on, periods = repeating.carried_on(held, told, said, bones)
         answer.local, answer.root = on.local, on.root
         changes = np.flatnonzero((seen.known[1:] != seen.known[:-1]).any(axis=1)) + 1
         answer.local = joined(answer.local, seen.known[:, :-1], changes, card.fps)
@@ -431,6 +429,10 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
     """
     frames, sight = len(motion.root), cards[0].max_gap
     closed = begin > 0 and end < frames
+    # What a skeleton lacks counts as known, so that a hole of it between known sides is none of the whole
+    # pose: gaps of 2 and 3 s on Bandai-Namco's (no middle joint of the spine) are off by 1.9 and 2.3 cm so,
+    # by 2.2 and 3.0 if filled as others' are. Not so at ends of clips: bodies glided in 5 % of the frames of
+    # forecasts of 2 s, and scuffed in a fifth of what led up to a clip.
     known = motion.known if closed else motion.known[:, motion.has]
     step, last_step = steps(known, begin, end, sight)
     whole = not known[begin:end].any()

@@ -65,17 +65,18 @@ class Rhythm:
     after: float | None
     inside: float
 
-    def sources(self, begin: int, end: int) -> list[Source]:
-        """What the frames of a hole, begin to end - 1, repeat: of what is before it, and of what is after."""
+    def sources(self, begin: int, end: int) -> tuple[list[Source], np.ndarray]:
+        """What the frames of a hole, begin to end - 1, repeat: of what is before it, and of what is after, if
+        something is; and to which share (n,) they do that."""
         time = np.arange(begin, end, dtype=float)
         on = np.mod((time - begin + 1) * self.before / self.inside, self.before)
         far = begin - 1 - self.before
+        first = Source(far + on, begin - 1, far)
         if self.after is None:
-            return [Source(far + on, begin - 1, far, np.ones(len(time)))]
+            return [first], np.zeros(len(time))
         back = np.mod((end - time) * self.after / self.inside, self.after)
-        share = (time - begin + 1) / (end - begin + 1)
-        first = Source(far + on, begin - 1, far, 1 - share)
-        return [first, Source(end + self.after - back, end, end + self.after, share)]
+        last = Source(end + self.after - back, end, end + self.after)
+        return [first, last], (time - begin + 1) / (end - begin + 1)
 
 
 @dataclass(frozen=True)
@@ -85,13 +86,11 @@ class Source:
     Attributes:
         at: (n,) the frames that those of the hole repeat.
         edge, far: the frame beside the hole, and the one that is a repetition away from it.
-        share: (n,) how much this side counts.
     """
 
     at: np.ndarray
     edge: float
     far: float
-    share: np.ndarray
 
     def rotations(self, local: np.ndarray) -> np.ndarray:
         """(n, m, 4) of the rotations (T, m, 4): one repetition leads to the next as it began."""
@@ -154,7 +153,8 @@ def _carried(
 ) -> tuple[Motion, float | None]:
     """What is said of a hole (n frames) with what repeats itself around it, in all other frames of `seen`;
     and the frames that a repetition takes, None without any."""
-    (begin, end), period = hole, None
+    begin, end = hole
+    periods: dict[Part, float] = {}
     yaw, local = heading(seen.local), seen.local.copy()
     local[:, 0] = rotations.multiply(rotations.about("Y", -yaw), local[:, 0])
     there, turned, root = heading(said.local), said.local.copy(), said.root
@@ -164,21 +164,23 @@ def _carried(
         rhythm = find(poses[:begin], poses[end:] if end < len(poses) else None, end - begin, part.alike)
         if rhythm is None:
             continue
-        period = rhythm.inside
-        sources, share = rhythm.sources(begin, end), np.full(end - begin, part.share)
+        periods[part] = rhythm.inside
+        sources, after = rhythm.sources(begin, end)
+        share = np.full(end - begin, part.share)
         if rhythm.after is None:
             # The further it goes the less the network knows, and the mean of two that stray is no step.
             share += (1 - part.share) * ease(np.minimum(np.arange(1, end - begin + 1) / ALONE, 1.0))
         again = [source.rotations(local[:, rows]) for source in sources]
-        both = _mixed(again[0], again[-1], sources[-1].share)
+        both = _mixed(again[0], again[-1], after)
         turned[:, rows] = _mixed(turned[:, rows], both, share)
         if part is BODY and rhythm.after is None:
             way, turns = _way(seen.part(slice(begin)), yaw[:begin], sources[0].at)
+            way[:, 1] = root[:, 1]  # who climbed a little would go on for ever
             steps = [np.diff(one, axis=0, prepend=seen.root[begin - 1 : begin]) for one in (root, way)]
             root = seen.root[begin - 1] + np.cumsum(steps[0] + share[:, None] * (steps[1] - steps[0]), axis=0)
-            there = there + share * _wrapped(turns - there)
+            there = there + share * np.unwrap(_wrapped(turns - there))
     turned[:, 0] = rotations.multiply(rotations.about("Y", there), turned[:, 0])
-    return Motion(turned, root), period
+    return Motion(turned, root), periods.get(BODY) or max(periods.values(), default=None)
 
 
 def heading(local: np.ndarray) -> np.ndarray:
@@ -224,6 +226,10 @@ def _way(seen: Motion, yaw: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.
 def find(before: np.ndarray, after: np.ndarray | None, length: int, alike: float) -> Rhythm | None:
     """How poses (n, d) before and after a hole of so many frames repeat themselves, if they are as much
     alike, and what is after repeats what is before."""
+    if after is not None and len(after) > len(before):
+        # What is shorter is looked for in what is longer.
+        found = find(after[::-1], before[::-1], length, alike)
+        return found and Rhythm(found.after or 0.0, found.before, found.inside)
     first = _nearby(before[::-1], alike)
     if first is None or after is None:
         return None if first is None else Rhythm(first, None, first)
