@@ -1,9 +1,9 @@
 """Arms that turn back at once: where a hand jumps further than hands do nearby, a spline leads the arm there.
 
 Networks cannot know where in its swing a hand is, and let it turn round within a frame of what is known. In
-150 gaps of one to three seconds of validation performers, and forecasts of one, `small` had 7 fills in which
-a joint's velocity jumped twice as far as anywhere in the truth, most of them waving hands; so it has 3, and
-joints are off by less (`bench artefacts --most 25`).
+200 gaps of one to three seconds and forecasts of one, of validation performers, `small` had 7 fills in which
+a joint's velocity jumped twice as far as anywhere in the truth, most of them waving hands; so it had 2, and
+joints were off by less (`bench artefacts --most 25`).
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ TAUT = 0.97
 # Radians by which a leg that pushes off lifts its heel, at most, instead of straightening by more than such a
 # share of its length; half of it where the hips are above the toe, all once they are half of so many metres
 # beyond. Feet drifted by more than 8 cm in a stance in 18 of 150 gaps of 2 and 3 s, between known motion or
-# lone keys (`bench artefacts --most 25`); so they do in 7, and joints are off by the same.
+# lone keys (`bench artefacts --most 25`); so they did in 8, and joints were off by the same.
 HEEL, STRAIGHTER, BEYOND = np.radians(40.0), 0.01, 0.10
 # Radians by which holding may turn a foot: from the first on it lets go, at twice as much it has. Ankle and
 # toe of one that swivels are led past each other.
