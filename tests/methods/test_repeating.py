@@ -73,6 +73,14 @@ def test_arms_and_legs_swing_on(turns):
     assert (done.local[outside] == said.local[outside]).all()
 
 
+def test_in_short_holes_the_network_counts_for_more():
+    truth, hole = walking(), (100, 105)
+    said = frozen(truth, hole)
+    done, _ = repeating.carried_on(truth, known(hole=hole), said, BONES)
+    left = 1 - repeating.ARMS[0].share * 5 / repeating.WHOLE
+    assert off(done, truth, "Arm", hole) == pytest.approx(left * off(said, truth, "Arm", hole), rel=0.05)
+
+
 def test_a_rhythm_that_quickens_fits_both_sides():
     truth = walking(np.interp(np.arange(FRAMES), [90, 150], [34.0, 31.0]))
     rhythm = repeating.find(

@@ -28,6 +28,9 @@ UNEVEN, STRETCHED = 0.2, 0.15
 STIRS, NEAR = 0.025, 0.05
 # Frames into what follows nothing, or is followed by nothing, from which on the repetition counts alone.
 ALONE = 45
+# Frames of a hole from which on repetitions count as much as they do anywhere: in shorter ones what is beside
+# it tells more.
+WHOLE = 15
 
 
 @dataclass(frozen=True)
@@ -166,7 +169,7 @@ def _carried(
             continue
         periods[part] = rhythm.inside
         sources, after = rhythm.sources(begin, end)
-        share = np.full(end - begin, part.share)
+        share = np.full(end - begin, part.share * min((end - begin) / WHOLE, 1.0))
         if rhythm.after is None:
             # The further it goes the less the network knows, and the mean of two that stray is no step.
             share += (1 - part.share) * ease(np.minimum(np.arange(1, end - begin + 1) / ALONE, 1.0))
