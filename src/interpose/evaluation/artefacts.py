@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from interpose.clip import Clip
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import DATASETS, windows
 from interpose.finish import complete, feet, measures
@@ -211,18 +210,12 @@ def run(
         size = feet.size(window.clip.skeleton)
         for task, (length, before, after) in TASKS.items():
             first = (FRAMES - length) // 2 - before
-            clip, gap = (
-                window.clip.slice(first, first + before + length + after),
-                Gap(before, before + length),
-            )
+            clip = window.clip.slice(first, first + before + length + after)
             truth = window.positions[first : first + len(clip)] / size
-
-            def judge(who: str, motion: Clip) -> None:
-                seen = Seen(window.canonical(motion) / size, truth, motion.fps, gap)  # noqa: B023
-                result.add(task, who, seen)  # noqa: B023
-
-            judge(TRUTH, clip)
-            for name, method in chosen.items():
-                judge(name, complete(clip, Observation.from_gaps(clip, [gap]), method).clip)
+            gap = Gap(before, before + length)
+            hidden = Observation.from_gaps(clip, [gap])
+            motions = {name: complete(clip, hidden, method).clip for name, method in chosen.items()}
+            for who, motion in {TRUTH: clip, **motions}.items():
+                result.add(task, who, Seen(window.canonical(motion) / size, truth, motion.fps, gap))
         progress((done + 1) / len(held), f"{done + 1} of {len(held)} windows")
     return result
