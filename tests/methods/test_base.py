@@ -7,6 +7,7 @@ import pytest
 
 from interpose.geometry import rotations
 from interpose.methods import base
+from interpose.methods.weights import find
 from interpose.skeletons import JOINTS
 
 FRAMES, OWN = 40, slice(10, 30)
@@ -44,3 +45,40 @@ def test_what_snaps_where_nothing_is_asked_for_counts_as_well():
     torn = np.where(np.arange(FRAMES) < 5, 0.0, 60.0)
     said = base.mean(answer("Head", torn), answer("Head", 0 * torn), OWN)
     np.testing.assert_allclose(degrees_of(said, "Head")[OWN], 30.0, atol=1e-6)
+
+
+def seen(frames: int, hole: slice, lacks: str = "") -> base.Seen:
+    """A body that stands still, in a hole of which nothing of what its skeleton has is known."""
+    has = np.ones(base.COLUMNS, bool)
+    if lacks:
+        has[JOINTS.index(lacks)] = False
+    known = np.ones((frames, base.COLUMNS), bool)
+    known[hole] = ~has
+    local = np.broadcast_to(rotations.identity(), (frames, len(JOINTS), 4))
+    zeros = np.zeros((frames, len(JOINTS), 3))
+    return base.Seen(local, zeros[:, 0], known, has, ("", ""), zeros[0], zeros, zeros[..., 0] > 0)
+
+
+@pytest.mark.parametrize("lacks", ["", "Spine1"])
+@pytest.mark.parametrize(("expected", "asked"), [(0.9 * base.SURE, 1), (1.1 * base.SURE, 4)])
+def test_what_it_is_sure_of_is_said_at_once_whatever_joints_there_are(monkeypatch, lacks, expected, asked):
+    """Else ten frames at either end in turn, until thirty are left."""
+    heads = []
+
+    def ask(cards, motion, own):
+        count = len(motion.root)
+        heads.append(own)
+        local = np.broadcast_to(rotations.identity(), (count, len(JOINTS), 4)).copy()
+        local[:, JOINTS.index("Head")] = rotations.about("Y", np.full(count, 0.1))
+        said = base.Answer(local, np.zeros((count, 3)), np.ones((count, 4)), np.full(count, expected))
+        return [(said, said)]
+
+    monkeypatch.setattr(base, "ask", ask)
+    hole = slice(20, 80)
+    done = base.run_long([find("small")], seen(100, hole, lacks))
+    assert len(heads) == asked, heads
+    turned = rotations.angle(done.local[:, JOINTS.index("Head")], rotations.identity())
+    np.testing.assert_allclose(
+        turned, np.where((np.arange(100) >= 20) & (np.arange(100) < 80), 0.1, 0.0), atol=1e-6
+    )
+    assert (done.expected[hole] >= expected).all()

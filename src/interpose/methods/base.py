@@ -48,6 +48,11 @@ CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
 # of 12.4, 57, 117 and 167: another motion, where nobody knows which, and no mean. Between lone keys 60 frames
 # apart bodies glide in 8 % of the frames when all is said at once, and in 4 % so (people in 3).
 STEP, MEET = 10, 30
+# What it expects to be off by, in metres and in the mean, up to which it says all that is left of a hole of
+# the whole pose at once, between known sides: there is little else that may happen. Of 60 windows of
+# Bandai-Namco's validation performers gaps of 2 and 3 s are off by 1.8 and 2.2 cm so, by 2.0 and 2.8 when
+# said in turn throughout; LAFAN1's, in which it is seldom as sure, by as much as ever.
+SURE = 0.04
 # What it has said itself of the whole pose, further than so many frames from what is known, counts as known
 # to this share: taken for true, what is a mean by then leads to a mean that moves even less. In the third and
 # fourth second of forecasts of LAFAN1's validation performer `small` moves 39 and 35 % as much as the truth
@@ -364,29 +369,32 @@ def haste(said: Answer, own: slice) -> float:
     return float((rotations.angle(local[1:], local[:-1]) / FASTEST).max(initial=0.0))
 
 
-def run_both(card: weights.Card, motion: Seen, own: slice) -> Answer:
-    """What the graph says of a motion, in the mean with what it says of the mirror image: so the mirror image
-    of a clip is completed as the mirror image of what the clip is, and errors are 2 to 4 % smaller."""
+def run_both(card: weights.Card, motion: Seen) -> tuple[Answer, Answer]:
+    """What the graph says of a motion, and what it says of the mirror image: in the mean of both the mirror
+    image of a clip is completed as the mirror image of what the clip is, and errors are 2 to 4 % smaller."""
     said, image = run(card, motion, motion.mirrored())
     sides, across = list(SIDES), ACROSS.values
     turned = image.local[:, sides] * ACROSS_TURN.values
-    other = Answer(turned, image.root * across, image.stands[:, FEET_ACROSS], image.expected)
-    return mean(said, other, own)
+    return said, Answer(turned, image.root * across, image.stands[:, FEET_ACROSS], image.expected)
 
 
-def ask(cards: Sequence[weights.Card], motion: Seen, own: slice) -> Answer:
-    """What the graphs say of a motion in the mean, for the sake of its frames `own`.
+def ask(cards: Sequence[weights.Card], motion: Seen, own: slice) -> list[tuple[Answer, Answer]]:
+    """What each graph says of a motion and of its mirror image, for the sake of its frames `own`.
 
     They have learned how motion goes on, not how it came about: where only what follows is known it goes
     backwards, which errs by a third less in gaps of a second.
     """
     known = np.asarray((motion.known > ROUGHLY).all(axis=1))
-    forwards = known[: own.start].any() or not known[own.stop :].any()
-    seen = motion if forwards else motion.backwards()
-    part = own if forwards else slice(len(known) - own.stop, len(known) - own.start)
-    first, *others = (run_both(card, seen, part) for card in cards)
-    said = reduce(partial(mean, own=part, share=BESIDE), others, first)
-    return said if forwards else said.backwards()
+    if known[: own.start].any() or not known[own.stop :].any():
+        return [run_both(card, motion) for card in cards]
+    said = [run_both(card, motion.backwards()) for card in cards]
+    return [(one.backwards(), image.backwards()) for one, image in said]
+
+
+def agreed(said: Sequence[tuple[Answer, Answer]], own: slice) -> Answer:
+    """The mean of all that is said of frames `own`."""
+    first, *others = (mean(*both, own) for both in said)
+    return reduce(partial(mean, own=own, share=BESIDE), others, first)
 
 
 def led(motion: Seen, begin: int, end: int) -> Seen:
@@ -398,12 +406,15 @@ def led(motion: Seen, begin: int, end: int) -> Seen:
     return replace(motion, root=root, known=known)
 
 
-def steps(known: np.ndarray, begin: int, end: int, sight: int) -> tuple[int, int]:
-    """How many frames of a hole, begin to end - 1, each window completes, and how many the last one may: half
-    of what the network can see where something is known in the hole, else as STEP and MEET say."""
-    if known[begin:end].any():
+def steps(known: np.ndarray, closed: bool, sight: int) -> tuple[int, int]:
+    """How many frames of a hole each window completes, and how many the last one may: half of what the
+    network can see where something is known in the hole, else as STEP and MEET say.
+
+    known: (n, 23) or fewer, what is known in the hole; `closed` between known frames.
+    """
+    if known.any():
         return max(sight // 2, 1), sight
-    return STEP, STEP if begin == 0 or end == len(known) else MEET
+    return STEP, MEET if closed else STEP
 
 
 def run_long(cards: Sequence[weights.Card], motion: Seen) -> Answer:
@@ -429,13 +440,9 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
     """
     frames, sight = len(motion.root), cards[0].max_gap
     closed = begin > 0 and end < frames
-    # What a skeleton lacks counts as known, so that a hole of it between known sides is none of the whole
-    # pose: gaps of 2 and 3 s on Bandai-Namco's (no middle joint of the spine) are off by 1.9 and 2.3 cm so,
-    # by 2.2 and 3.0 if filled as others' are. Not so at ends of clips: bodies glided in 5 % of the frames of
-    # forecasts of 2 s, and scuffed in a fifth of what led up to a clip.
-    known = motion.known if closed else motion.known[:, motion.has]
-    step, last_step = steps(known, begin, end, sight)
-    whole = not known[begin:end].any()
+    known = motion.known[begin:end, motion.has]
+    whole = not known.any()
+    step, last_step = steps(known, closed, sight)
     in_turn, sure = closed and whole, np.ones(frames)
     if whole:
         sure[begin + FIRM * (begin > 0) : end - FIRM * (end < frames)] = GUESSED
@@ -445,18 +452,23 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
         first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
         if end - begin > sight:
             first, last = (end - sight, last) if backwards else (first, begin + sight)
+        # The first window that sees all that is left tells the errors of all of it.
+        sees_all = end - begin <= sight
+        part, hole = slice(first, last), slice(begin - first, end - first)
         inside = slice(begin, end)
         if end - begin > last_step:
             inside = slice(end - step, end) if backwards else slice(begin, begin + step)
-        part, own = slice(first, last), slice(inside.start - first, inside.stop - first)
-        said = ask(cards, motion.part(part), own)
+        own = slice(inside.start - first, inside.stop - first)
+        each = ask(cards, motion.part(part), own)
+        said = agreed(each, own)
+        if in_turn and sees_all and said.expected[hole].mean() <= SURE:
+            inside, own = slice(begin, end), hole
+            said = agreed(each, own)
         for held_back, new in ((done.stands, said.stands), (done.expected, said.expected)):
             held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
-        # The first window that sees all that is left tells the errors of all of it.
-        sees_all = end - begin <= sight
         errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
         if astray and not sees_all:
-            said = ask(cards, led(motion, begin, end).part(part), own)
+            said = agreed(ask(cards, led(motion, begin, end).part(part), own), own)
         _take(motion, inside, said, own, sure[inside])
         done.stands[inside] = said.stands[own]
         begin, end = (begin, inside.start) if backwards else (inside.stop, end)
