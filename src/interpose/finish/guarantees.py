@@ -10,7 +10,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import anatomy, arms, falling, feet, floor, jumps, notes, pins, seams, stepping
+from interpose.finish import (
+    anatomy,
+    arms,
+    falling,
+    feet,
+    floor,
+    jumps,
+    notes,
+    pins,
+    seams,
+    shuffling,
+    stepping,
+)
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
 from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
@@ -27,6 +39,7 @@ from interpose.skeletons.targets import seated
 
 STOOD = "what the body stands on tells where it is"
 STEPS = "the body turns on the spot, in steps"
+STEPPED = "feet step where they would have shuffled"
 # Rounds in which velocity jumps above the limit are softened.
 ROUNDS = 24
 # One that came no nearer to it, by this share, in so many of them than before is left as it is.
@@ -87,7 +100,8 @@ class _Work:
         before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
         mended: the frames of spans over which a spline leads, by the span's first.
-        stepped: the first frames of spans that were given steps, and whether in the method's own motion.
+        stepped: what is to be said of spans that were given steps, by their first frames and whether in the
+            method's own motion.
     """
 
     def __init__(self, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> None:
@@ -98,7 +112,7 @@ class _Work:
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
         self.unheld: dict[Gap, tuple[float, float]] = {}
         self.mended: dict[int, list[tuple[int, int]]] = {}
-        self.stepped: set[tuple[int, bool]] = set()
+        self.stepped: dict[tuple[int, bool], str] = {}
 
     def listen(self) -> None:
         """Let the method speak, and start from what it says."""
@@ -159,9 +173,13 @@ class _Work:
             if own and not layer:
                 _land(current, self.firm, span)
             if not layer and _step(current, self.firm, span):
-                self.stepped.add((span.start, own))
+                self.stepped[span.start, own] = STEPS
             elif not (own and layer and layer.stands):
-                _plant(current, self.firm, span, self.bounds, self.raw.stands if own else None)
+                stands = self.raw.stands if own else None
+                _plant(current, self.firm, span, self.bounds, stands)
+                if not layer and _unshuffle(current, self.firm, span, self.bounds):
+                    self.stepped[span.start, own] = STEPPED
+                    _plant(current, self.firm, span, self.bounds, stands)
                 _lift(current, self.firm, span)
         if self.bounds is None:
             return
@@ -225,8 +243,8 @@ class _Work:
             for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():
                 which = f"frames {ask.first + start} to {ask.first + stop - 1}"
                 span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
-            if (span.start, span.method == ask.method.name) in self.stepped:
-                span.notes.append((span.start, span.stop - 1, STEPS))
+            if steps := self.stepped.get((span.start, span.method == ask.method.name)):
+                span.notes.append((span.start, span.stop - 1, steps))
             excess, above, where = jumps.excess(current, known, span, self.bounds, ask.first)
             if excess > 1:
                 span.notes.append((where, where, f"flagged: {above}"))
@@ -318,6 +336,21 @@ def _step(current: Clip, known: Observation, span: Span) -> bool:
     return done is not None
 
 
+def _unshuffle(current: Clip, known: Observation, span: Span, bounds: jumps.Bounds | None) -> bool:
+    """Let feet of a span step that shuffle; False where none does, or legs would jump further than they do
+    in the observed motion."""
+    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
+    part, seen = current.slice(lo, hi), known.slice(lo, hi)
+    usual, frames = _usual(part, seen, _peak(current, bounds)), np.arange(*inner)
+    before = jumps.share(part, seen, frames, usual)
+    for takes in shuffling.TAKES:
+        done = shuffling.stepping(part, seen, inner, takes)
+        if done is not None and jumps.share(done, seen, frames, usual) <= max(1.0, before):
+            write(current, done, span.start, inner)
+            return True
+    return False
+
+
 def _plant(
     current: Clip, known: Observation, span: Span, bounds: jumps.Bounds | None, stands: np.ndarray | None
 ) -> None:
@@ -325,12 +358,16 @@ def _plant(
     observed motion, or so that they jump least."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
     done, seen = current.slice(lo, hi), known.slice(lo, hi)
-    anywhere = np.full(len(current.skeleton), jumps.SETS_OFF / current.fps**2)
-    peak = anywhere if bounds is None else bounds.peak
+    peak = _peak(current, bounds)
     usual = _usual(done, seen, peak)
     for leg in range(len(feet.legs(current.skeleton))):
         done = _hold(done, seen, inner, leg, peak, usual, None if stands is None else stands[lo:hi])
     write(current, done, span.start, inner)
+
+
+def _peak(clip: Clip, bounds: jumps.Bounds | None) -> np.ndarray:
+    """(J,) how far velocities of joints may jump inside of gaps, also where nothing tells how far they do."""
+    return np.full(len(clip.skeleton), jumps.SETS_OFF / clip.fps**2) if bounds is None else bounds.peak
 
 
 def _usual(clip: Clip, known: Observation, peak: np.ndarray) -> np.ndarray:

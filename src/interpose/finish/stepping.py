@@ -102,9 +102,9 @@ def stepped(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip | Non
     angles = np.zeros(stop - start)
     if abs(turn.angle) > TURN:
         angles = _evenly(clip, known, turn.angle, span)
-    done, sunk = _let_down(clip, known, angles, goal, span)
+    done, sunk = let_down(clip, known, angles, goal, span)
     if sunk > SINK * feet.size(clip.skeleton):
-        done, _ = _let_down(_over_feet(clip, turn, goal, span), known, angles, goal, span)
+        done, _ = let_down(_over_feet(clip, turn, goal, span), known, angles, goal, span)
     return done if _unsteady(done, known, span) < before else None
 
 
@@ -119,9 +119,7 @@ def _on_the_spot(clip: Clip, known: Observation, span: tuple[int, int]) -> Turn 
     heights = stands[..., 1]
     if max(np.ptp(heights, axis=0).max(), np.ptp(heights, axis=1).max()) > LEVEL * grown:
         return None
-    mapping = find_mapping(skeleton)
-    hips = placed[keys, hips_of(skeleton), 1] - heights[..., 0].mean(axis=1)
-    if hips.min() < UPRIGHT * mapping.leg_length:
+    if not stands_upright(clip)[keys].all():
         return None
     middles = stands.mean(axis=(1, 2))
     angle = _angle(clip, span)
@@ -131,6 +129,13 @@ def _on_the_spot(clip: Clip, known: Observation, span: tuple[int, int]) -> Turn 
     if goes < NEAR * grown and abs(angle) < TURNS:
         return None
     return Turn(stands, angle)
+
+
+def stands_upright(clip: Clip) -> np.ndarray:
+    """(F,) whether hips are as high above the ankles as they are of who stands."""
+    placed, ankles = clip.positions(), feet.pairs(clip.skeleton)[:, 0]
+    hips = placed[:, hips_of(clip.skeleton), 1] - placed[:, ankles, 1].mean(axis=1)
+    return np.asarray(hips > UPRIGHT * find_mapping(clip.skeleton).leg_length)
 
 
 def _heading(placed: np.ndarray, clip: Clip) -> np.ndarray:
@@ -225,7 +230,7 @@ def _rate(clip: Clip, known: Observation, key: int, ahead: int) -> float:
     return _angle(clip, (first + 1, first + far)) / far
 
 
-def _let_down(
+def let_down(
     clip: Clip, known: Observation, angles: np.ndarray, goal: np.ndarray, span: tuple[int, int]
 ) -> tuple[Clip, float]:
     """The clip as `_led`, its hips let down a little where a leg, which may be straight in both keys, is too
