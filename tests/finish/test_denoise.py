@@ -14,6 +14,7 @@ from interpose.finish import Provenance, feet, measures
 from interpose.finish.denoise import deviation
 from interpose.geometry import rotations
 from interpose.geometry.time import resample
+from interpose.observation.scan import scan
 from interpose.skeletons import find_mapping
 
 
@@ -263,3 +264,37 @@ def test_feet_that_leave_are_not_held_back(cmu_walk):
     came, left = (_apart(clip, cmu_walk) for clip in (noisy, interpose.denoise(noisy).clip))
     assert left.mean() < 0.5 * came.mean()
     assert (left - came).max() < 3.5
+
+
+@pytest.mark.parametrize("joints", [None, ("RightArm", "RightForeArm")])
+def test_what_is_frozen_is_left_to_be_filled(cmu_walk, joints):
+    """Smoothed, its ends would be rounded off, and a scan would no longer find it."""
+    frames = slice(81, 120)
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rows = slice(None) if joints is None else [cmu_walk.skeleton.index(name) for name in joints]
+    rotation[frames, rows] = rotation[80, rows]
+    if joints is None:
+        translation[frames] = translation[80]
+    held = _shaken_turns(cmu_walk.with_motion(rotation, translation), frames)
+    done = tasks.denoise(held)
+    assert (done.clip.rotation[frames, rows] == held.rotation[frames, rows]).all()
+    assert not done.provenance[frames, rows].any()
+    for clip in (held, done.clip):
+        found = [one for one in scan(clip) if one.kind == "frozen" and (one.start, one.stop) == (81, 120)]
+        assert {*(joints or (None,))} <= {name for one in found for name in one.joints or (None,)}
+    assert done.report.noise.frozen[0].startswith("81:120 (")
+    assert "left as it is: frozen 81:120" in str(done.report)
+    # Around it noise goes, and nothing is drawn to the frozen pose.
+    error = rotations.angle(done.clip.rotation, cmu_walk.rotation)
+    before = rotations.angle(held.rotation, cmu_walk.rotation)
+    around = np.r_[70:80, 122:132]
+    assert error[around].mean() < 0.8 * before[around].mean()
+    assert error[around].max() < 1.1 * before[around].max()
+
+
+def _shaken_turns(clip: Clip, but: slice) -> Clip:
+    """A clip whose joints tremble by a degree, but for some frames and the one that these hold."""
+    rng = np.random.default_rng(3)
+    noise = rotations.exp(rng.normal(0, np.radians(1), (*clip.rotation.shape[:2], 3)))
+    noise[but.start - 1 : but.stop] = [1.0, 0.0, 0.0, 0.0]
+    return clip.with_motion(rotations.multiply(clip.rotation, noise), clip.translation)

@@ -34,6 +34,7 @@ from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation
+from interpose.observation.tremor import calmed
 from interpose.skeletons.carrier import rooted
 from interpose.skeletons.targets import seated
 
@@ -91,6 +92,7 @@ class _Work:
     """A clip as it is being completed: each step takes it further.
 
     Attributes:
+        hidden: the clip without what is missing, and, until all is done, without what trembles beside that.
         known: what must come back unchanged.
         firm: what is known, and joints that never turn.
         spans: the runs of frames in which something is missing; `gaps` lie within them.
@@ -105,8 +107,9 @@ class _Work:
     """
 
     def __init__(self, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> None:
-        self.clip, self.hidden, self.observation, self.ask = clip, hidden, observation, ask
+        self.clip, self.observation, self.ask = clip, observation, ask
         self.layer = ask.method if isinstance(ask.method, Layer) else None
+        self.hidden = hidden if self.layer else calmed(hidden, observation)
         self.known = self.firm = certain(hidden, observation)
         self.gaps = self.known.gaps(clip.skeleton)
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]

@@ -176,11 +176,13 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     ahead = way[:, 0] * np.sin(course) + way[:, 1] * np.cos(course)
     back = np.where(ahead < -BACKWARDS * pace, pace, 0.0)
     inside = slice(gap.start - lo, gap.stop - lo)
-    # Evened out, the frames beside the gap go half as it does.
+    # Evened out, the frames beside the gap go half as it does; what goes on at an end of the clip does so at
+    # their pace.
+    ends = gap.start == 0 or gap.stop == len(finished)
     beside = grow(
         (np.arange(hi - lo) >= inside.start) & (np.arange(hi - lo) < inside.stop), round(3 * EVEN * fps)
     )
-    seen = known.frames[lo:hi] & ~beside
+    seen = known.frames[lo:hi] & (ends | ~beside)
     frame = inside.start + int(back[inside].argmax())
     if back[frame] > max(BACK, 1.2 * float(back[seen].max(initial=0.0))):
         said = (
@@ -190,8 +192,9 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     fastest, usual = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
     if seen.sum() >= fps / 2 and fastest > HURRIES * max(usual, SLOW):
         frames = math.ceil(len(gap) * fastest / max(usual, SLOW))
+        longer = "" if ends else f". With about {frames} frames it would not"
         paces = f"{fastest * size:.1f} m/s, where the motion around it goes at {usual * size:.1f}"
-        return [f"flagged: it hurries: up to {paces}. With about {frames} frames it would not"]
+        return [f"flagged: it hurries: up to {paces}{longer}"]
     return []
 
 

@@ -142,6 +142,7 @@ class NoiseReport:
         values: how many there are: frames times joints.
         joints: each joint.
         noisy: the frames "START:STOP" that are noisy where the rest is not; `noise` is then theirs.
+        frozen: the frames and joints in which nothing moves, left as they are, and what fills them.
     """
 
     start: int
@@ -156,6 +157,7 @@ class NoiseReport:
     values: int
     joints: tuple[JointNoise, ...] = field(repr=False)
     noisy: tuple[str, ...] = ()
+    frozen: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         shakiest = max(self.joints, key=lambda one: one.noise)
@@ -173,6 +175,7 @@ class NoiseReport:
                 f"({furthest.joint})",
                 f"turned: joints by {self.turned:.2f} degrees in the mean, at most by {self.turned_most:.2f} "
                 f"({twisted.joint})",
+                *[f"left as it is: frozen {one}" for one in self.frozen],
             ]
         )
 

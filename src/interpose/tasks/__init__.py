@@ -1,10 +1,11 @@
 """What the verbs mean: say what is observed, choose a method for each gap, complete, and report."""
 
+from interpose.tasks.denoising import denoise
 from interpose.tasks.filling import fill, fitted
 from interpose.tasks.forecasting import Forecast, forecast
 from interpose.tasks.keys import between, block
 from interpose.tasks.planning import plan
-from interpose.tasks.recovering import denoise, recover
+from interpose.tasks.recovering import recover
 from interpose.tasks.stitching import Cycle, Stitched, cycle, stitch
 
 __all__ = [

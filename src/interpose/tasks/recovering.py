@@ -1,4 +1,4 @@
-"""Joints that are lost, named or found; and noise."""
+"""Joints that are lost, named or found."""
 
 from __future__ import annotations
 
@@ -8,21 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError, is_number
+from interpose.errors import RequestError
 from interpose.finish import Completion, Provenance
-from interpose.finish.denoise import denoised
 from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
-from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.observation.broken import broken
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import strays, stuck
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
-from interpose.tasks.planning import seed_of
-
-STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
 
 def recover(
@@ -70,63 +65,19 @@ def recover(
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
     if joints is None:
-        swapped = _swapped(clip, start, stop)
+        swapped = swaps(clip, start, stop)
         sides = put_back(clip, swapped)
         done = fill(sides, _by_itself(sides, start, stop), method, seed=seed, progress=progress)
-        return _with_sides(done, swapped)
+        return with_sides(done, swapped)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
-def denoise(
-    clip: Clip,
-    strength: float = 1.0,
-    joints: Sequence[str] | None = None,
-    frames: tuple[int, int] | None = None,
-    method: str = "auto",
-    seed: int | None = None,
-) -> Completion:
-    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
-
-    Args:
-        clip: what is observed but not fully trusted.
-        strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
-        joints: the joints that may turn, roots among them that move, too; None for all.
-        frames: the range in which anything may change, from which the noise is estimated, too.
-        method: what fills values that were lost; "auto" interpolates, which is best for moments.
-        seed: for methods that sample.
-
-    Raises:
-        RequestError: too few frames, a strength that is none from 0 to 100, a joint or range that does not
-            exist.
-    """
-    seed = seed_of(seed)
-    if not is_number(strength, 0, STRONGEST):
-        raise RequestError(
-            f"cannot denoise with strength {str(strength)[:40]}",
-            "the estimated noise is multiplied with it",
-            f"Choose 0 to {STRONGEST:g}: 1 trusts the estimate, 2 smooths more.",
-        )
-    start, stop = frames or (0, len(clip))
-    if frames is not None:
-        Gap(start, stop).check(len(clip))
-    chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
-    swapped = _swapped(clip, start, stop) if chosen is None and strength else []
-    sides = put_back(clip, swapped)
-    if method == "auto":
-        return _with_sides(denoised(sides, strength, chosen, start, stop), swapped)
-    registry.get(method)
-    done = denoised(
-        sides, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
-    )
-    return _with_sides(done, swapped)
-
-
-def _swapped(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
+def swaps(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
     """What was taken for something else within the frames start to stop - 1."""
     return [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
 
 
-def _with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
+def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
     """A completion that also tells what was on the wrong side, and was put back."""
     if not swapped:
         return done

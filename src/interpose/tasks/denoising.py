@@ -1,0 +1,137 @@
+"""Noise is smoothed, what is lost for moments is filled, and what is frozen is left to `fill`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from interpose.clip import Clip
+from interpose.errors import RequestError, few, is_number
+from interpose.finish import Completion, Provenance
+from interpose.finish.denoise import denoised
+from interpose.methods import registry
+from interpose.methods.classical import Spline
+from interpose.observation import Gap, Observation
+from interpose.observation.broken import broken
+from interpose.observation.exchange import put_back
+from interpose.observation.scan import STUCK, Finding, scan
+from interpose.skeletons.carrier import place_of
+from interpose.tasks.filling import fill
+from interpose.tasks.planning import seed_of
+from interpose.tasks.recovering import swaps, with_sides
+
+STRONGEST = 100.0  # how many times the estimated noise may be assumed
+
+
+def denoise(
+    clip: Clip,
+    strength: float = 1.0,
+    joints: Sequence[str] | None = None,
+    frames: tuple[int, int] | None = None,
+    method: str = "auto",
+    seed: int | None = None,
+) -> Completion:
+    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
+
+    Args:
+        clip: what is observed but not fully trusted.
+        strength: what the estimated noise is multiplied with: 0 changes nothing, 2 is smoother.
+        joints: the joints that may turn, roots among them that move, too; None for all.
+        frames: the range in which anything may change, from which the noise is estimated, too.
+        method: what fills values that were lost; "auto" interpolates, which is best for moments.
+        seed: for methods that sample.
+
+    Raises:
+        RequestError: too few frames, a strength that is none from 0 to 100, a joint or range that does not
+            exist.
+    """
+    seed = seed_of(seed)
+    if not is_number(strength, 0, STRONGEST):
+        raise RequestError(
+            f"cannot denoise with strength {str(strength)[:40]}",
+            "the estimated noise is multiplied with it",
+            f"Choose 0 to {STRONGEST:g}: 1 trusts the estimate, 2 smooths more.",
+        )
+    start, stop = frames or (0, len(clip))
+    if frames is not None:
+        Gap(start, stop).check(len(clip))
+    chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
+    swapped = swaps(clip, start, stop) if chosen is None and strength else []
+    sides = put_back(clip, swapped)
+    frozen = _frozen(sides, start, stop) if strength else []
+    led = _led_over(sides, frozen)
+    if method == "auto":
+        done = denoised(led, strength, chosen, start, stop)
+    else:
+        registry.get(method)
+        done = denoised(
+            led, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
+        )
+    return with_sides(_with_frozen(done, sides, frozen), swapped)
+
+
+def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
+    """What is missing of a clip in frames start to stop - 1, as nothing moves there, and is no noise."""
+    lost = ~broken(clip).rotation
+    found = [one for one in scan(clip) if one.kind in ("frozen", *STUCK)]
+    # What snaps to its rest pose, and stays there, is among what is broken, which is filled.
+    return [
+        one
+        for one in found
+        if one.start < stop
+        and start < one.stop
+        and not lost[one.start : one.stop, _values(clip, one)[0]].any()
+    ]
+
+
+def _values(clip: Clip, one: Finding) -> tuple[list[int], list[int]]:
+    """The joints of a finding that do not turn, and those whose place stands still."""
+    joints = [*range(len(clip.skeleton))] if one.joints is None else [*map(clip.skeleton.index, one.joints)]
+    if one.kind == "frozen position":
+        return [], joints
+    if one.kind == "frozen body":
+        return joints, [place_of(clip)]
+    return joints, joints if one.joints is None else []
+
+
+def _led_over(clip: Clip, frozen: Sequence[Finding]) -> Clip:
+    """A clip whose frozen values a spline leads over: smoothed, their ends would be rounded off, and nobody
+    would find them any more."""
+    if not frozen:
+        return clip
+    seen = Observation.full(clip)
+    for one in frozen:
+        turns, places = _values(clip, one)
+        seen.rotation[one.start : one.stop, turns] = False
+        seen.translation[one.start : one.stop, places] = False
+    return Spline().complete(clip, seen).clip
+
+
+def _told(one: Finding) -> str:
+    joints = few(list(one.joints)) if one.joints else "all"
+    by = "recover restores" if one.kind in STUCK else "fill fills"
+    return f"{one.start}:{one.stop} ({joints}), which interpose {by}"
+
+
+def _with_frozen(done: Completion, clip: Clip, frozen: Sequence[Finding]) -> Completion:
+    """A completion with frozen values as they were, also those in which they are held, and what is said of
+    them."""
+    if not frozen:
+        return done
+    turned, moved = (np.zeros(done.provenance.shape, bool) for _ in range(2))
+    for one in frozen:
+        turns, places = _values(clip, one)
+        part = slice(max(one.start - 1, 0), one.stop)
+        turned[part, turns] = moved[part, places] = True
+    own = done.provenance != Provenance.METHOD  # what was broken in the frame that is held was filled
+    turned, moved = turned & own, moved & own
+    columns = list(clip.translated)
+    rotation = np.where(turned[..., None], clip.rotation, done.clip.rotation)
+    translation = np.where(moved[:, columns, None], clip.translation, done.clip.translation)
+    provenance = np.where(turned | moved, Provenance.OBSERVED, done.provenance).astype(np.int8)
+    assert done.report.noise is not None
+    told = tuple(_told(one) for one in frozen)
+    report = replace(done.report, noise=replace(done.report.noise, frozen=told))
+    return replace(done, clip=clip.with_motion(rotation, translation), provenance=provenance, report=report)
