@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from importlib import resources
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from interpose import tasks
 from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
-from interpose.observation.gait import in_step, legs, stride
+from interpose.observation.gait import cycles, in_step, legs, stride
 from interpose.observation.timeline import Placement
 from interpose.skeletons import find_humanoid
+from interpose.tasks import stitching
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +79,25 @@ def test_who_stands_is_no_cycle_of_a_walk(walk):
     found = tasks.cycle(walk.with_motion(rotation, walk.translation[at]))
     assert found.stop <= 92
     assert found.stop + found.frames - found.start == pytest.approx(41, abs=4)
+
+
+def test_of_ways_to_go_round_the_first_one_counts_that_closes_well(walk, monkeypatch):
+    """Where all are flagged, the one in which feet slide least."""
+    found = cycles(find_humanoid(walk), walk)
+    assert len(found) > 2
+    assert [apart for *_, apart in found] == sorted(apart for *_, apart in found)
+    assert len({(start, stop) for start, stop, _ in found}) == len(found)
+
+    def closing(slides: list[float], flagged: int):
+        reports = iter(
+            SimpleNamespace(foot_slide=slide, gliding=0.0, notes=("flagged: feet slide",) * (i < flagged))
+            for i, slide in enumerate(slides)
+        )
+        return lambda *_, **__: SimpleNamespace(report=SimpleNamespace(gaps=[next(reports)]))
+
+    for slides, flagged, chosen in (([9.0, 9.0, 9.0], 0, 0), ([50.0, 9.0, 5.0], 1, 1)):
+        monkeypatch.setattr(stitching, "stitch", closing(slides, flagged))
+        assert tasks.cycle(walk).start == found[chosen][0]
+    slides = [50.0, 40.0, 60.0, 70.0, 80.0][: len(found)]
+    monkeypatch.setattr(stitching, "stitch", closing(slides, len(found)))
+    assert tasks.cycle(walk).start == found[1][0]

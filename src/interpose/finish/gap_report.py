@@ -85,8 +85,8 @@ def gap_report(
 
 
 def _risk(raw: Raw, finished: Clip, known: Observation, gap: Gap) -> np.ndarray | None:
-    """Metres by frame of the gap that joints are expected to be off by which are not known; None where nobody
-    says it."""
+    """Metres by frame of the gap that joints are expected to be off by of which it is not known where they
+    are; None where there are none, as of a hand that is turned alone, or nobody says it."""
     if raw.expected is None or not np.isfinite(raw.expected[gap.start : gap.stop]).all():
         return None
     # It speaks of all joints of the humanoid: those that are known are not off at all. Of 50 joints and limbs
@@ -94,6 +94,8 @@ def _risk(raw: Raw, finished: Clip, known: Observation, gap: Gap) -> np.ndarray 
     # (rank correlation .75).
     placed = known.slice(gap.start, gap.stop).positions(finished.skeleton)
     hidden = ~placed[:, list(find_mapping(finished.skeleton).mapped[1])]
+    if not hidden.any():
+        return None
     share = hidden.mean(axis=1)
     return raw.expected[gap.start : gap.stop] / np.where(share > 0, share, 1.0) * (share > 0)
 

@@ -24,6 +24,7 @@ ALIKE = 0.5
 # Seconds that a motion which goes round takes at most; and the share of what its poses are from their mean
 # within which it comes back.
 ROUND, CLOSES = 8.0, 0.5
+MOST = 5  # ways to go round that are told
 LIVELY = 0.7  # of the pace of a whole clip: what moves less than that stands in it
 TURNED = 0.05  # metres that joints may be apart instead of the body going round by a radian
 
@@ -112,16 +113,17 @@ def in_step(body: Humanoid, before: Clip, after: Clip) -> InStep | None:
     )
 
 
-def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
+def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
     """The frames of a motion between which it may go round: at the second one it is as it was at the first,
     in pose and pace, and heads about where it did; and by how many metres joints are apart there.
 
-    The two that are most alike, from SHORTEST to ROUND seconds apart, of those between which it moves as the
-    whole of it does: who stands is most alike. None where nothing comes back.
+    Those that are most alike first, from SHORTEST to ROUND seconds apart, of those between which it moves as
+    the whole of it does: who stands is most alike; a few at most, each half of SHORTEST apart from others.
+    None where nothing comes back.
     """
     least, most = max(1, round(SHORTEST * clip.fps)), min(round(ROUND * clip.fps), len(clip) - 1)
     if least > most:
-        return None
+        return []
     placed = body.positions(clip)
     hips = placed[:, :1] * FLOOR.values
     faces = np.unwrap(facing(placed))
@@ -130,13 +132,19 @@ def cycle(body: Humanoid, clip: Clip) -> tuple[int, int, float] | None:
     paces = AHEAD * clip.fps * (np.gradient(around, axis=0) + ways[:, None])
     seen = np.concatenate([around, paces], axis=1)
     gone = np.cumsum(np.linalg.norm(paces, axis=2).mean(axis=1))
-    best = (np.inf, 0, 0)
+    # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
+    usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
+    found = []
     for lag in range(least, most + 1):
         apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
         apart[gone[lag:] - gone[:-lag] < LIVELY * lag * gone[-1] / len(clip)] = np.inf
         apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
-        at = int(apart.argmin())
-        best = min(best, (float(apart[at]), at, at + lag))
-    # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
-    usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
-    return None if best[0] > CLOSES * usual else (best[1], best[2], best[0])
+        beside = np.pad(apart, 1, constant_values=np.inf)
+        at = np.flatnonzero((apart <= np.minimum(beside[:-2], beside[2:])) & (apart <= CLOSES * usual))
+        found += [(float(apart[i]), int(i), int(i) + lag) for i in at]
+    chosen: list[tuple[int, int, float]] = []
+    for apart_by, start, stop in sorted(found):
+        other = all(abs(start - a) + abs(stop - b) >= least for a, b, _ in chosen)
+        if other and len(chosen) < MOST:
+            chosen.append((start, stop, apart_by))
+    return chosen
