@@ -10,10 +10,11 @@ import pytest
 
 import interpose
 from interpose import formats, tasks
-from interpose.geometry import rotations
+from interpose.geometry import kinematics, rotations
 from interpose.observation import exchange
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import scan, to_gaps
+from interpose.skeletons import JOINTS, PARENTS, SIDES, find_humanoid
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
 
@@ -208,3 +209,45 @@ def test_a_knee_that_bends_the_other_way_is_found_and_turned_back(cmu_walk, limb
     assert np.abs(done.clip.positions() - clip.positions())[:, joints].max() < 1e-9
     (said,) = [one for one in scan(odd) if one.kind == "flipped"]
     assert said.joints == (limb[0], limb[2])
+
+
+@pytest.fixture(scope="module")
+def trial(data):
+    """Of a skeleton whose left and right bones have axes of their own."""
+    return formats.load(data / "cmu_02_03.amc", skeleton=data / "cmu_02.asf")
+
+
+def crossed(clip, rows, start, stop):
+    """The clip with canonical joints that point where those of the other side do, in some frames."""
+    body = find_humanoid(clip)
+    local = kinematics.local_rotations(body.rotations(clip), PARENTS)
+    local[start:stop, rows] = local[start:stop, [SIDES[row] for row in rows]]
+    return body.to_clip(kinematics.global_rotations(local, PARENTS), body.root(clip), clip)
+
+
+@pytest.mark.parametrize("parts", [("UpLeg", "Leg", "Foot", "Toe"), ("Shoulder", "Arm", "ForeArm", "Hand")])
+def test_limbs_with_axes_of_their_own_are_put_back(trial, parts):
+    rows = [row for row, name in enumerate(JOINTS) if name.endswith(parts) and name[0] in "LR"]
+    start, stop = 12, 26
+    odd = crossed(trial, rows, start, stop)
+    off = np.linalg.norm(odd.positions() - trial.positions(), axis=-1)
+    assert off.max() > 0.1
+    found = exchanges(odd)
+    assert [(one.start, one.stop) for one in found] == [(start, stop)]
+    back = put_back(odd, found)
+    np.testing.assert_allclose(back.positions(), trial.positions(), atol=1e-9)
+    outside = np.r_[:start, stop : len(trial)]
+    assert (back.rotation[outside] == odd.rotation[outside]).all()
+    assert exchanges(trial) == []
+
+
+def test_exchanged_values_are_not_taken_for_exchanged_limbs(trial):
+    """Where axes differ that is something else: put back as limbs they would be half a metre off."""
+    names = ["femur", "tibia", "foot", "toes"]
+    left, right = ([trial.skeleton.index(side + name) for name in names] for side in "lr")
+    rotation = trial.rotation.copy()
+    rotation[12:26, left + right] = trial.rotation[12:26, right + left]
+    odd = trial.with_motion(rotation, trial.translation)
+    found = exchanges(odd)
+    worst = np.linalg.norm(odd.positions() - trial.positions(), axis=-1).max()
+    assert np.linalg.norm(put_back(odd, found).positions() - trial.positions(), axis=-1).max() <= worst + 1e-9
