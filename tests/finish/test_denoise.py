@@ -292,6 +292,29 @@ def test_what_is_frozen_is_left_to_be_filled(cmu_walk, joints):
     assert error[around].max() < 1.1 * before[around].max()
 
 
+def test_a_clip_that_begins_frozen_stays_so(cmu_walk):
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    rotation[:41], translation[:41] = rotation[40], translation[40]
+    held = _shaken_turns(cmu_walk.with_motion(rotation, translation), slice(1, 41))
+    done = tasks.denoise(held)
+    assert (done.clip.rotation[:41] == held.rotation[:41]).all()
+    assert (done.clip.rotation[42:] != held.rotation[42:]).any()
+    find = [(one.kind, one.start, one.stop) for one in scan(held) if one.kind == "frozen"]
+    assert find == [(one.kind, one.start, one.stop) for one in scan(done.clip) if one.kind == "frozen"] != []
+
+
+def test_only_what_did_not_change_counts_as_observed(cmu_walk):
+    """Hips whose place stands still may turn, and be smoothed."""
+    translation = cmu_walk.translation.copy()
+    translation[81:140] = translation[80]
+    held = _shaken_turns(cmu_walk.with_motion(cmu_walk.rotation, translation), slice(1, 1))
+    done = tasks.denoise(held)
+    assert any("recover" in told for told in done.report.noise.frozen)
+    assert (done.clip.translation[81:140] == held.translation[81:140]).all()
+    untouched = done.provenance == Provenance.OBSERVED
+    assert (done.clip.rotation == held.rotation)[untouched].all()
+
+
 def _shaken_turns(clip: Clip, but: slice) -> Clip:
     """A clip whose joints tremble by a degree, but for some frames and the one that these hold."""
     rng = np.random.default_rng(3)

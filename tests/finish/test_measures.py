@@ -142,6 +142,28 @@ def test_who_goes_backwards_or_hurries_is_told(cmu_walk):
         assert [word in note for note in said] == [True] * bool(word)
 
 
+@pytest.mark.parametrize(("pace", "hurries"), [(1.2, False), (2.2, False), (4.0, True), (10.0, True)])
+@pytest.mark.parametrize("ahead", [True, False])
+def test_what_hurries_on_at_an_end_is_told_without_advice(cmu_walk, pace, hurries, ahead):
+    """More frames of a forecast would not slow it down; who ran at its beginning runs on."""
+    gap = Gap(120, 180) if ahead else Gap(0, 60)
+    speed = np.full(180, 1.2)
+    speed[gap.start : gap.stop] = pace
+    translation = np.repeat(cmu_walk.translation[[40]], 180, axis=0)
+    course = facing(find_humanoid(cmu_walk).positions(cmu_walk.slice(40, 41))[0])
+    translation[:, 0] += np.cumsum(speed)[:, None] / 30 * [np.sin(course), 0.0, np.cos(course)]
+    clip = cmu_walk.with_motion(np.repeat(cmu_walk.rotation[[40]], 180, axis=0), translation)
+    said = notes.hasty(clip, Observation.from_gaps(clip, [gap]), gap, 0)
+    assert ["hurries" in note for note in said] == [True] * hurries
+    assert not any("would not" in note for note in said)
+    # As fast just before, it goes on.
+    speed[105:120] = speed[60:75] = pace
+    translation = np.repeat(cmu_walk.translation[[40]], 180, axis=0)
+    translation[:, 0] += np.cumsum(speed)[:, None] / 30 * [np.sin(course), 0.0, np.cos(course)]
+    clip = clip.with_motion(clip.rotation, translation)
+    assert notes.hasty(clip, Observation.from_gaps(clip, [gap]), gap, 0) == []
+
+
 def test_a_pose_that_glides_below_a_root_that_stays_is_no_life(cmu_walk):
     """The bones of a game rig hang on an armature that stays where it is."""
     body = cmu_walk.skeleton

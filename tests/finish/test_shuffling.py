@@ -16,6 +16,7 @@ from interpose.geometry.time import resample
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.mirror import mirror
 
 BEFORE, MISSING = 40, 60
 SPAN = (BEFORE, BEFORE + MISSING)
@@ -96,6 +97,16 @@ def test_a_turned_body_takes_the_same_steps(standing):
     turned = standing.with_motion(rotation, rotations.rotate(turn, standing.translation))
     there = toes(finished(shuffle(turned, 0.3, 0.2)))
     np.testing.assert_allclose(there, rotations.rotate(turn, reference), atol=1e-3)
+
+
+def test_of_two_steps_at_once_the_mirror_image_takes_the_mirror_image(standing):
+    """Near an end of a gap both would be as late as there is time for."""
+    clip = shuffle(standing, 0.3, 0.2)
+    one, image = (
+        shuffling.stepping(each, Observation.from_gaps(each, [Gap(*SPAN)]), SPAN, 0.4)
+        for each in (clip, mirror(clip))
+    )
+    np.testing.assert_allclose(mirror(image).positions(), one.positions(), atol=2e-3)
 
 
 def test_at_another_frame_rate_the_steps_are_the_same(standing):

@@ -10,9 +10,10 @@ import pytest
 
 import interpose
 from interpose import formats, tasks
+from interpose.clip import Clip, Skeleton
 from interpose.geometry import kinematics, rotations
 from interpose.observation import exchange
-from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
+from interpose.observation.exchange import Crossing, Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import scan, to_gaps
 from interpose.skeletons import JOINTS, PARENTS, SIDES, find_humanoid
 
@@ -225,15 +226,15 @@ def crossed(clip, rows, start, stop):
     return body.to_clip(kinematics.global_rotations(local, PARENTS), body.root(clip), clip)
 
 
-@pytest.mark.parametrize("parts", [("UpLeg", "Leg", "Foot", "Toe"), ("Shoulder", "Arm", "ForeArm", "Hand")])
-def test_limbs_with_axes_of_their_own_are_put_back(trial, parts):
+def test_legs_with_axes_of_their_own_are_put_back(trial):
+    parts = ("UpLeg", "Leg", "Foot", "Toe")
     rows = [row for row, name in enumerate(JOINTS) if name.endswith(parts) and name[0] in "LR"]
     start, stop = 12, 26
     odd = crossed(trial, rows, start, stop)
     off = np.linalg.norm(odd.positions() - trial.positions(), axis=-1)
     assert off.max() > 0.1
     found = exchanges(odd)
-    assert [(one.start, one.stop) for one in found] == [(start, stop)]
+    assert [(type(one), one.start, one.stop) for one in found] == [(Crossing, start, stop)]
     back = put_back(odd, found)
     np.testing.assert_allclose(back.positions(), trial.positions(), atol=1e-9)
     outside = np.r_[:start, stop : len(trial)]
@@ -251,3 +252,18 @@ def test_exchanged_values_are_not_taken_for_exchanged_limbs(trial):
     found = exchanges(odd)
     worst = np.linalg.norm(odd.positions() - trial.positions(), axis=-1).max()
     assert np.linalg.norm(put_back(odd, found).positions() - trial.positions(), axis=-1).max() <= worst + 1e-9
+
+
+@pytest.mark.parametrize("lost", [("LHipJoint", "RHipJoint"), ("RightLeg",), ("LowerBack",)])
+def test_of_half_a_body_nothing_is_asked_that_takes_a_whole_one(cmu_walk, lost):
+    skeleton = cmu_walk.skeleton
+    gone = {skeleton.index(name) for name in lost}
+    kept = [j for j in range(len(skeleton)) if not gone & {j, *skeleton.ancestors(j)}]
+    part = Skeleton(
+        tuple(skeleton.names[j] for j in kept),
+        tuple(kept.index(skeleton.parents[j]) if j else -1 for j in kept),
+        skeleton.rest_translation[kept],
+    )
+    half = Clip(part, cmu_walk.rotation[:, kept], cmu_walk.translation[:, :1], cmu_walk.fps)
+    assert exchanges(half) == []
+    tasks.denoise(half)

@@ -135,10 +135,10 @@ def denoised(
         tremble = deviation(piece.positions())
         noise = np.maximum(noise, tremble) if one.noisy else noise
         if strength > 0:
-            calm = _smooth(piece, own, strength, tremble)
-            calm = _ease(done.slice(first, last), calm, start + first > 0, start + last < len(clip))
+            still = _smooth(piece, own, strength, tremble)
+            still = _ease(done.slice(first, last), still, start + first > 0, start + last < len(clip))
             rotation, translation = done.rotation.copy(), done.translation.copy()
-            rotation[first:last], translation[first:last] = calm.rotation, calm.translation
+            rotation[first:last], translation[first:last] = still.rotation, still.translation
             done = done.with_motion(rotation, translation)
     done = _seated(cut, done, whole, free)
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
@@ -273,14 +273,14 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     skeleton = clip.skeleton
     moves = free.rotation.all(axis=0) & (deviation(rotations.continuous(clip.rotation)) > QUIET)
     known = Observation(np.broadcast_to(~moves, free.rotation.shape), ~free.translation)
-    calm = _calm_turns(clip, moves, strength)
+    still = _calm_turns(clip, moves, strength)
     mapping = find_mapping(skeleton)
     joints = mapping.mapped[1] if mapping.usable else tuple(range(len(skeleton)))
     noise = strength * noise
     shaky = max(SHAKY, QUICK * (AROUND / clip.fps) ** 2)
     near = np.where(noise > shaky, FAR * noise, np.inf)
-    places = _calm(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
-    done = solve(calm, known, joints, places)
+    places = calm(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
+    done = solve(still, known, joints, places)
     unsteady = noise[feet.ends(skeleton)].max(initial=0.0)
     if unsteady <= UNSTEADY:
         return done
@@ -311,27 +311,27 @@ def _calm_turns(clip: Clip, moves: np.ndarray, strength: float) -> Clip:
         above = world[:, parent] if parent >= 0 else rotations.identity(len(own))
         if moves[joint]:
             signal = rotations.continuous((own if to_parent[joint] else turned)[:, [joint]])
-            calm = rotations.normalize(_calm(signal, clip.fps, strength)[:, 0])
-            local[:, joint] = calm if to_parent[joint] else rotations.relative(above, calm)
+            still = rotations.normalize(calm(signal, clip.fps, strength)[:, 0])
+            local[:, joint] = still if to_parent[joint] else rotations.relative(above, still)
         world[:, joint] = rotations.multiply(above, local[:, joint])
     return clip.with_motion(local, clip.translation)
 
 
-def _calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
+def calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
     """Signals (F, n, d) smoothed as far as their noise, times `strength`, makes it worth while.
 
     Smoothers of growing stiffness (Whittaker 1923, second differences) are weighed at every frame by their
     risk around it: what they leave of the signal, plus twice the noise that they let through (Stein 1981).
     """
-    calm = signals.copy()
+    still = signals.copy()
     for i, noise in enumerate(strength * deviation(signals)):
         if noise > NOTHING:
-            calm[:, i] = _weighed(signals[:, i], noise, MOMENT * fps)
-    return calm
+            still[:, i] = _weighed(signals[:, i], noise, MOMENT * fps)
+    return still
 
 
 def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
-    """One signal (F, d), weighed as in `_calm`; its noise and `moment` (frames) are above zero."""
+    """One signal (F, d), weighed as in `calm`; its noise and `moment` (frames) are above zero."""
     count = len(signal)
     stages = np.stack([signal, *(_whittaker(signal, stiff) for stiff in STIFF)])
     # The eigenvalues of the penalty are nearly those of a free beam; 1 / (1 + ...) is what is let through.

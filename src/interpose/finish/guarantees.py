@@ -23,6 +23,7 @@ from interpose.finish import (
     shuffling,
     stepping,
 )
+from interpose.finish.calming import calmed
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
 from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
@@ -34,7 +35,6 @@ from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation
-from interpose.observation.tremor import calmed
 from interpose.skeletons.carrier import rooted
 from interpose.skeletons.targets import seated
 
@@ -92,7 +92,8 @@ class _Work:
     """A clip as it is being completed: each step takes it further.
 
     Attributes:
-        hidden: the clip without what is missing, and, until all is done, without what trembles beside that.
+        bare: the clip without what is missing; `hidden` the same without what trembles beside that, which is
+            what is completed.
         known: what must come back unchanged.
         firm: what is known, and joints that never turn.
         spans: the runs of frames in which something is missing; `gaps` lie within them.
@@ -109,7 +110,7 @@ class _Work:
     def __init__(self, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> None:
         self.clip, self.observation, self.ask = clip, observation, ask
         self.layer = ask.method if isinstance(ask.method, Layer) else None
-        self.hidden = hidden if self.layer else calmed(hidden, observation)
+        self.bare, self.hidden = hidden, hidden if self.layer else calmed(hidden, observation)
         self.known = self.firm = certain(hidden, observation)
         self.gaps = self.known.gaps(clip.skeleton)
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
@@ -140,10 +141,10 @@ class _Work:
                 opinion = merge(opinion, hidden, stays)
         self.opinion = held(opinion, self.clip.source)
         self.current = merge(self.opinion, hidden, known)
-        limits = seams.limits(hidden, known) if ask.limits is None else ask.limits
+        limits = seams.limits(self.bare, known) if ask.limits is None else ask.limits
         self.bounds = None
         if limits is not None:
-            self.bounds = jumps.Bounds(limits, jumps.peak_limits(hidden, known, limits))
+            self.bounds = jumps.Bounds(limits, jumps.peak_limits(self.bare, known, limits))
         self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
 
     def look(self) -> None:
@@ -241,7 +242,7 @@ class _Work:
         # What is pinned itself stays where that puts it.
         stays = np.isin(clip.skeleton.names, [pin.joint for pin in pinned])
         current = seated(current, known.translation, known.rotation | stays)
-        current = merge(held(current, clip.source), self.hidden, known)
+        current = merge(held(current, clip.source), self.bare, known)
         for span in self.spans:
             for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():
                 which = f"frames {ask.first + start} to {ask.first + stop - 1}"

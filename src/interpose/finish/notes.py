@@ -176,13 +176,11 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     ahead = way[:, 0] * np.sin(course) + way[:, 1] * np.cos(course)
     back = np.where(ahead < -BACKWARDS * pace, pace, 0.0)
     inside = slice(gap.start - lo, gap.stop - lo)
-    # Evened out, the frames beside the gap go half as it does; what goes on at an end of the clip does so at
-    # their pace.
-    ends = gap.start == 0 or gap.stop == len(finished)
+    # Evened out, the frames beside the gap go half as it does.
     beside = grow(
         (np.arange(hi - lo) >= inside.start) & (np.arange(hi - lo) < inside.stop), round(3 * EVEN * fps)
     )
-    seen = known.frames[lo:hi] & (ends | ~beside)
+    seen = known.frames[lo:hi] & ~beside
     frame = inside.start + int(back[inside].argmax())
     if back[frame] > max(BACK, 1.2 * float(back[seen].max(initial=0.0))):
         said = (
@@ -190,6 +188,13 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
         )
         return [said + _helps(finished, gap, ": more frames, or a key in which it has turned, help")]
     fastest, usual = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
+    ends = gap.start == 0 or gap.stop == len(finished)
+    if ends and (own := np.delete(placed[:, 0], np.r_[inside], axis=0)).shape[0] > 1:
+        # What goes on at an end of the clip does so at the pace of the frames beside it.
+        alone = ndimage.gaussian_filter1d(
+            np.gradient(own, axis=0)[:, [0, 2]] * fps / size, EVEN * fps, axis=0, mode="nearest"
+        )
+        usual = float(np.linalg.norm(alone, axis=1).max())
     if seen.sum() >= fps / 2 and fastest > HURRIES * max(usual, SLOW):
         frames = math.ceil(len(gap) * fastest / max(usual, SLOW))
         longer = "" if ends else f". With about {frames} frames it would not"

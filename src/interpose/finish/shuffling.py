@@ -37,6 +37,7 @@ class Step:
         start, stop: the frames of the shuffle, start to stop - 1.
         part: from which share of its way to which it goes.
         middle, takes: the frame in the middle of it, and frames that it takes.
+        order: what steps are sorted by, the first ones first.
     """
 
     leg: int
@@ -45,6 +46,7 @@ class Step:
     part: tuple[float, float]
     middle: float
     takes: float
+    order: tuple[float, float]
 
     @property
     def room(self) -> tuple[float, float]:
@@ -97,10 +99,12 @@ def steps(clip: Clip, known: Observation, span: tuple[int, int], takes: float) -
             if count * takes * fps > last - 1 - first:
                 continue
             for number in range(count):
-                middle = np.interp((number + 0.5) / count * way[-1], way, np.arange(first, last))
-                middle = np.clip(middle, first + takes * fps / 2, last - 1 - takes * fps / 2)
+                half_way = float(np.interp((number + 0.5) / count * way[-1], way, np.arange(first, last)))
+                middle = np.clip(half_way, first + takes * fps / 2, last - 1 - takes * fps / 2)
                 part = (number / count, (number + 1) / count)
-                found.append(Step(leg, first, last, part, float(middle), takes * fps))
+                # Of two at once the longer one: whose mirror image comes first, too.
+                order = (half_way, -float(way[-1]))
+                found.append(Step(leg, first, last, part, float(middle), takes * fps, order))
     return found
 
 
@@ -112,7 +116,7 @@ def _got(foot: np.ndarray) -> np.ndarray:
 def _one_by_one(found: list[Step]) -> list[Step]:
     """Steps one after the other: those that would be at once make way for each other, as far as they may;
     none where that is not far enough."""
-    found = sorted(found, key=lambda one: one.middle)
+    found = sorted(found, key=lambda one: one.order)
     for _ in found:
         for i, (one, other) in enumerate(zip(found, found[1:])):
             over = (one.takes + other.takes) / 2 - (other.middle - one.middle)

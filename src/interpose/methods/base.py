@@ -422,8 +422,9 @@ def run_long(cards: Sequence[weights.Card], motion: Seen) -> Answer:
 
     A hole is seen with what is around it, as far as the network can see. What a window completes is taken as
     known from then on: of single joints half of what it sees, of the whole pose STEP frames, between known
-    frames from both sides in turn, and more than FIRM frames from these to the share GUESSED. What it says of
-    feet and errors it also says of the known frames around; far from any hole nothing does (NaN).
+    frames from both sides in turn, unless it is SURE of all that is left, and more than FIRM frames from
+    these to the share GUESSED. What it says of feet and errors it also says of the known frames around; far
+    from any hole nothing does (NaN).
     """
     local, root, known = motion.local.copy(), motion.root.copy(), motion.known.astype(float)
     motion, frames = replace(motion, local=local, root=root, known=known), len(root)

@@ -134,7 +134,9 @@ def exchanges(clip: Clip) -> list[Exchange | Flip]:
         both = [(a, b) for a, b in pairs if a is not None and b is not None]
         if JOINTS[limb[0]].startswith("Left") and both:
             sides = [_whole(clip, one) for one in _spells(clip, Exchange(0, 0, *zip(*both)))]
-            found += sides or _crossings(clip, Exchange(0, 0, *zip(*both)))
+            if not sides and mapping.usable:
+                sides = _crossings(clip, Exchange(0, 0, *zip(*both)))
+            found += sides
         # Of an arm it is the collar that comes first.
         bones = own[:3] if JOINTS[limb[0]].endswith("UpLeg") else own[1:]
         if None not in bones and _chain(clip, bones):  # type: ignore[arg-type]

@@ -140,11 +140,12 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
         apart[gone[lag:] - gone[:-lag] < LIVELY * lag * gone[-1] / len(clip)] = np.inf
         apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
         beside = np.pad(apart, 1, constant_values=np.inf)
-        at = np.flatnonzero((apart <= np.minimum(beside[:-2], beside[2:])) & (apart <= CLOSES * usual))
-        found += [(float(apart[i]), int(i), int(i) + lag) for i in at]
+        at = np.flatnonzero((apart < beside[:-2]) & (apart <= beside[2:]) & (apart <= CLOSES * usual))
+        found += [(float(apart[i]), int(i), int(i) + lag) for i in at[np.argsort(apart[at])[:MOST]]]
     chosen: list[tuple[int, int, float]] = []
     for apart_by, start, stop in sorted(found):
-        other = all(abs(start - a) + abs(stop - b) >= least for a, b, _ in chosen)
-        if other and len(chosen) < MOST:
+        if len(chosen) == MOST:
+            break
+        if all(abs(start - a) + abs(stop - b) >= least for a, b, _ in chosen):
             chosen.append((start, stop, apart_by))
     return chosen

@@ -9,7 +9,6 @@ from scipy.special import gammaincinv
 from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
-from interpose.observation.observation import Observation
 
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -28,9 +27,6 @@ NOISY, WINDOW, MOSTLY = 0.006, 0.5, 0.6
 # at least; and so many times as much as it does in the rest. Of 276 clips of all data sets 17 tremble so, ten
 # of them of one set, in fits that can be seen; the others in hands, toes and thumbs.
 TURNS, SLOW, FINEST, STANDS_OUT = np.radians(3.5), 30.0, np.radians(1.5), 5.0
-# Seconds beside what is missing of a joint in which it is asked whether it trembles, and the deviation of the
-# Gaussian with which it is smoothed there.
-BESIDE, SMOOTH = 0.35, 0.1
 
 
 def deviation(values: np.ndarray) -> np.ndarray:
@@ -84,39 +80,6 @@ def restless(clip: Clip) -> list[tuple[int, int, tuple[int, ...]]]:
             together.append((start, stop, (joint,)))
     always = tuple(np.flatnonzero(usual > least).tolist())
     return [(0, len(clip), always)] * bool(always) + together
-
-
-def calmed(clip: Clip, known: Observation) -> Clip:
-    """The clip with joints smoothed that tremble beside frames in which they are missing: how they go on
-    there no two frames of noise tell.
-
-    A hand that is noisy by 2, 4 and 8 degrees for .4 s on either side of 1.5 s in which it is lost (a trial
-    of CMU's, 120 fps) was filled with errors of 13.7, 20.8 and 38.4 degrees in the mean, as noise went on as
-    speed; 9.0 without noise.
-    """
-    if clip.fps < SLOWEST:
-        return clip
-    count, rotation = max(FEWEST, round(BESIDE * clip.fps)), clip.rotation.copy()
-    least = max(FINEST, TURNS * SLOW / clip.fps)
-    for joint in np.flatnonzero(~known.rotation.all(axis=0)):
-        parts = runs(known.rotation[:, joint])
-        sides = [(start, min(stop, start + count)) for start, stop in parts if start > 0]
-        sides += [(max(start, stop - count), stop) for start, stop in parts if stop < len(clip)]
-        turns = rotations.continuous(clip.rotation[:, joint])
-        for start, stop in sides:
-            if stop - start < FEWEST or (much := _trembles(turns, [(start, stop)])) <= least:
-                continue
-            if least >= _trembles(turns, parts) >= much / STANDS_OUT:
-                continue  # as it does all along
-            smooth = ndimage.gaussian_filter1d(turns[start:stop], SMOOTH * clip.fps, axis=0, mode="nearest")
-            rotation[start:stop, joint] = rotations.normalize(smooth)
-    return clip.with_motion(rotation, clip.translation)
-
-
-def _trembles(turns: np.ndarray, parts: list[tuple[int, int]]) -> float:
-    """Radians by which a joint, quaternions (F, 4), turns to and fro in frames start to stop - 1 of parts."""
-    longer = [trembling(turns[a:b, None])[:, 0] for a, b in parts if b - a >= FEWEST]
-    return float(2 * np.median(np.concatenate(longer)))
 
 
 def _window(clip: Clip) -> int:

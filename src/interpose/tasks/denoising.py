@@ -121,16 +121,23 @@ def _with_frozen(done: Completion, clip: Clip, frozen: Sequence[Finding]) -> Com
     if not frozen:
         return done
     turned, moved = (np.zeros(done.provenance.shape, bool) for _ in range(2))
+    columns = list(clip.translated)
     for one in frozen:
         turns, places = _values(clip, one)
-        part = slice(max(one.start - 1, 0), one.stop)
-        turned[part, turns] = moved[part, places] = True
+        kept = [*range(one.start, one.stop)]
+        for frame in {one.start - 1, one.stop} & {*range(len(clip))}:
+            held = (clip.rotation[frame, turns] == clip.rotation[one.start, turns]).all()
+            where = [columns.index(joint) for joint in places if joint in columns]
+            if held and (clip.translation[frame, where] == clip.translation[one.start, where]).all():
+                kept.append(frame)
+        turned[np.ix_(kept, turns)] = moved[np.ix_(kept, places)] = True
     own = done.provenance != Provenance.METHOD  # what was broken in the frame that is held was filled
     turned, moved = turned & own, moved & own
-    columns = list(clip.translated)
     rotation = np.where(turned[..., None], clip.rotation, done.clip.rotation)
     translation = np.where(moved[:, columns, None], clip.translation, done.clip.translation)
-    provenance = np.where(turned | moved, Provenance.OBSERVED, done.provenance).astype(np.int8)
+    same = (rotation == clip.rotation).all(axis=-1)
+    same[:, columns] &= (translation == clip.translation).all(axis=-1)
+    provenance = np.where((turned | moved) & same, Provenance.OBSERVED, done.provenance).astype(np.int8)
     assert done.report.noise is not None
     told = tuple(_told(one) for one in frozen)
     report = replace(done.report, noise=replace(done.report.noise, frozen=told))
