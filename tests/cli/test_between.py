@@ -167,8 +167,8 @@ def test_a_proposal_begins_at_the_last_anchor(run, take):
     assert "after the anchor at 90" in done.out
     made, source = load(take.with_name("a.bvh")), load(take)
     assert 100 <= len(made) - 2 <= 120
-    assert np.array_equal(made.rotation[90], source.rotation[60])
-    assert np.array_equal(made.rotation[-1], source.rotation[80])
+    # The file may have other angles of the same turns.
+    assert np.abs(made.rotation[[90, -1]] - source.rotation[[60, 80]]).max() < 1e-12
 
 
 def test_a_target_of_another_body_stands_on_the_floor(run, take):

@@ -447,8 +447,8 @@ def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given,
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
     seen = method.Seen(local, root, known == 1, ALL, ("walk", "walk"), bones, pinned, pins)
     hole = slice(10, 30)
-    both, first = method.ask([one, two], seen, hole), method.ask([one], seen, hole)
-    second = method.ask([two], replace(seen, actions=("", "")), hole)
+    both, first = (method.agreed(method.ask(cards, seen, hole), hole) for cards in ([one, two], [one]))
+    second = method.agreed(method.ask([two], replace(seen, actions=("", "")), hole), hole)
     assert np.abs(first.root - second.root).max() > 1e-3
     share = method.BESIDE
     assert np.allclose(both.root, (1 - share) * first.root + share * second.root)
@@ -474,7 +474,9 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
     for limit in (np.pi, 0.0):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(method, "AGREE", limit)
-            said, other = (method.run_both(card, one, slice(0, 40)) for one in (seen, seen.mirrored()))
+            said, other = (
+                method.mean(*method.run_both(card, one), slice(0, 40)) for one in (seen, seen.mirrored())
+            )
         back = seen.mirrored()
         back.local, back.root = other.local, other.root
         back = back.mirrored()

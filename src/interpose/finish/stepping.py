@@ -43,6 +43,7 @@ LIFT = np.array([0.08, 0.05])
 # Seconds over which hips sink, and metres that they may before they stay over the feet; and how far they get
 # then from where they are over them in the keys. Three of 30 turns squatted by 15 to 22 cm, now by 2 at most.
 SINKS, SINK, SWAY = 0.25, 0.05, 0.15
+REACHED = 1e-4  # metres by which an ankle misses where it is to be that is there
 # The share of frames in which it glides, and the metres by which a foot drifts while it stands, from which a
 # method's own motion is no way to turn.
 GLIDES, DRIFTS = 0.25, 0.08
@@ -240,6 +241,8 @@ def let_down(
     done = _led(clip, angles, dip, goal, span)
     ankles = [leg.ankle for leg in feet.legs(clip.skeleton)]
     short = done.positions()[start:stop, ankles, 1] - goal[..., 0, 1]
+    if short.max() < REACHED:
+        return done, 0.0
     dip = spread(np.maximum(short, 0.0).max(axis=1), SINKS * clip.fps)
     dip *= np.prod(envelope(~known.frames, SINKS * clip.fps), axis=0)[start:stop]
     return _led(clip, angles, dip, goal, span), float(dip.max())
@@ -280,7 +283,7 @@ def _led(clip: Clip, angles: np.ndarray, dip: np.ndarray, goal: np.ndarray, span
     place[0][inside] = rotations.multiply(turn, turned[inside, joint])
     place[1][inside] = hips + rotations.rotate(turn, placed[inside, joint] - hips)
     place[1][inside, 1] -= dip
-    led = moved(clip, {joint: place})
+    led = moved(clip, {joint: place}) if angles.any() or dip.any() else clip
     turned, placed = (some[inside] for some in led.kinematics())
     rotation = led.rotation.copy()
     for leg, ends in zip(feet.legs(clip.skeleton), np.moveaxis(goal, 1, 0)):
