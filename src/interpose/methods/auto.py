@@ -12,7 +12,7 @@ from interpose.observation import Gap
 
 # Networks for gaps with motion on a side and for joints missing on their own, and for gaps between two lone
 # keys, the best one first; measured on validation performers. Amid motion joints are off by 1.7, 3.7 and
-# 6.3 cm with `base` in gaps of 15, 30 and 60 frames, 1.8, 3.7 and 6.5 with `small`, 2.6, 4.6 and 6.7 with
+# 6.4 cm with `base` in gaps of 15, 30 and 60 frames, 1.8, 3.7 and 6.5 with `small`, 2.6, 4.6 and 6.7 with
 # `cae`, which has seen these performers, 3.3, 7.7 and 9.8 with the spline. Between two lone keys a second
 # apart 5.0 with `base` and `small`, 5.4 with `cmib`, two seconds apart with one more in the middle 5.1, 5.3
 # and 5.5. One joint, or three, or a limb that is lost 4.3, 6.5 and 9.2 with `base`, 8.9, 14.0 and 16.7 with
