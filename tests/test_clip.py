@@ -134,11 +134,17 @@ def test_a_skeleton_from_arrays_is_one_and_bones_are_checked():
 
 
 def test_slices_and_new_motion():
-    whole = clip(5, source="layout", name="take")
+    class Layout:
+        def take(self, frames):
+            return frames
+
+    whole = clip(5, source=Layout(), name="take")
     part = whole.slice(1, 3)
-    assert (len(part), part.source, part.name) == (2, None, "take")
+    assert (len(part), part.source, part.name) == (2, slice(1, 3), "take")
     other = whole.with_motion(whole.rotation, whole.translation + 1)
-    assert other.source == "layout"
+    assert other.source is whole.source
+    assert [4, 0] == whole.take([4, 0]).source.tolist() == whole.take(np.array([4, 0])).source.tolist()
+    assert [2] == whole.take(np.arange(5) == 2).source.tolist() == whole.take([-3]).source.tolist()
     assert (whole.translation == 0).all()
     assert whole.seconds == pytest.approx(5 / 30)
 

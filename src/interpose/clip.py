@@ -5,16 +5,29 @@ Units and axes: metres, Y up, right-handed; unit quaternions (w, x, y, z); frame
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
 from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics
 from interpose.geometry.time import check_rate
+
+Frames = slice | Sequence[int] | np.ndarray  # what picks some frames: numbers, or whether each is meant
+
+
+class Source(Protocol):
+    """What a file has and a clip does not: its layout, and the text of its numbers. It goes along with a clip
+    that is cut, or joined with others, for writing."""
+
+    def take(self, frames: slice | np.ndarray) -> Source:
+        """Of some of the clip's frames, in that order; -1 is none of them."""
+
+    def along(self, parts: Sequence[tuple[Source | None, int]]) -> Source:
+        """Of parts one after another, each so many frames long: the numbers of this file's own are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,7 +162,7 @@ class Clip:
         translated: the K joints whose translation is animated; the roots, and others where a file has
             them. All other joints keep the skeleton's rest translation.
         name: where the clip came from, for reports.
-        source: what the file format adds (layout, original text); opaque here, used when writing.
+        source: what the file format adds (layout, original text), for writing: a Source, or None.
     """
 
     skeleton: Skeleton
@@ -246,12 +259,18 @@ class Clip:
         return self.kinematics()[1]
 
     def slice(self, start: int, stop: int) -> Clip:
-        """Frames start to stop - 1, as a clip of its own without the file's layout.
+        """Frames start to stop - 1, as a clip of its own; the file's layout stays for writing.
 
         Numbers count as in any slice: what is not there is left out, negative ones count from the end.
         """
+        return self.take(slice(start, stop))
+
+    def take(self, frames: Frames) -> Clip:
+        """Some frames, in any order; the file's layout stays for writing, and the text of their numbers."""
+        index = frames if isinstance(frames, slice) else np.arange(len(self))[frames]
+        source = self.source.take(index) if self.source is not None else None
         return replace(
-            self, rotation=self.rotation[start:stop], translation=self.translation[start:stop], source=None
+            self, rotation=self.rotation[index], translation=self.translation[index], source=source
         )
 
     def with_motion(self, rotation: np.ndarray, translation: np.ndarray) -> Clip:

@@ -424,6 +424,17 @@ def test_longer_and_shorter(body, tmp_path):
     assert body.read_bytes().startswith((tmp_path / "short.amc").read_bytes())
 
 
+def test_a_cut_keeps_its_text_and_is_counted_from_the_first_number_on(data, tmp_path):
+    whole = formats.load(data / "cmu_02_03.amc")
+    (tmp_path / "cmu_02.asf").write_bytes((data / "cmu_02.asf").read_bytes())
+    assert formats.save(whole.slice(5, 9), tmp_path / "cmu_02_03.amc") == ()
+    header, *texts = re.split(rb"(?m)^\d+\r?\n", (data / "cmu_02_03.amc").read_bytes())
+    cut = b"".join(b"%d\r\n" % (41 + k) + text for k, text in enumerate(texts[5:9]))
+    assert (tmp_path / "cmu_02_03.amc").read_bytes() == header + cut
+    again = formats.load(tmp_path / "cmu_02_03.amc")
+    assert np.array_equal(again.rotation, whole.rotation[5:9])
+
+
 def test_other_clips_are_refused(cmu_walk, body, tmp_path):
     with pytest.raises(RequestError, match=r"\.bvh instead"):
         formats.save(cmu_walk, tmp_path / "a.amc")

@@ -13,6 +13,7 @@ from interpose import formats
 from interpose.clip import Clip, Skeleton
 from interpose.errors import FileError, RequestError
 from interpose.geometry import rotations
+from interpose.observation.timeline import joined
 
 
 def motion_lines(path):
@@ -148,6 +149,29 @@ def test_longer_shorter_slower(data, cmu_walk, tmp_path):
     again = formats.load(tmp_path / "long.bvh")
     assert (again.fps, len(again)) == (60, 418)
     assert rotations.angle(again.rotation, longer.rotation).max() < 1e-5
+
+
+def test_cuts_and_joins_keep_their_text(data, cmu_walk, tmp_path):
+    """Of frames of the same file in any order, whatever lies between them: angles beyond 180 degrees, say,
+    would be lost if numbers were made anew."""
+    original = motion_lines(data / "cmu_walk.bvh")
+    formats.save(cmu_walk.slice(60, 90).slice(-10, 30), tmp_path / "cut.bvh")
+    assert motion_lines(tmp_path / "cut.bvh") == original[80:90]
+    formats.save(cmu_walk.take([208, 3, 3, 7, 8]), tmp_path / "picked.bvh")
+    assert motion_lines(tmp_path / "picked.bvh") == [original[frame] for frame in (208, 3, 3, 7, 8)]
+    moved = cmu_walk.slice(20, 30)
+    moved = moved.with_motion(moved.rotation, moved.translation + 1.0)
+    parts = [cmu_walk.slice(100, 140), moved, cmu_walk.slice(0, 30)]
+    formats.save(joined(cmu_walk, parts), tmp_path / "joined.bvh")
+    lines = motion_lines(tmp_path / "joined.bvh")
+    assert lines[:40] + lines[50:] == original[100:140] + original[:30]
+    turns = [line.split(b" ")[3:] for line in (*lines[40:50], *original[20:30])]
+    assert turns[:10] == turns[10:]
+    np.testing.assert_allclose(formats.load(tmp_path / "joined.bvh").root[40:50], moved.root, atol=1e-5)
+    longer = joined(cmu_walk, [cmu_walk, formats.load(data / "cmu_walk.bvh")]).slice(200, 215)
+    formats.save(longer, tmp_path / "both.bvh")
+    assert motion_lines(tmp_path / "both.bvh")[:9] == original[200:]
+    np.testing.assert_allclose(formats.load(tmp_path / "both.bvh").positions(), longer.positions(), atol=1e-4)
 
 
 def test_extending_a_file_without_a_last_line_end(tmp_path, make_bvh, body):

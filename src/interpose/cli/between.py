@@ -127,7 +127,7 @@ def _blocked(
     """
     from interpose.finish import on_rig_of
     from interpose.observation.scan import strays
-    from interpose.tasks.blocking import blocked, posed
+    from interpose.tasks.blocking import blocked
 
     met_at = [_met(text) for text in anchors]
     for k, (what, when) in enumerate(met_at):
@@ -155,7 +155,7 @@ def _blocked(
         raise RequestError(
             f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
         )
-    met = {when: posed(clip, frame) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
+    met = {when: clip.slice(frame, frame + 1) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
     count = None if frames == "auto" else int(frames)
     done = blocked(clips[0], at[0], clips[1], at[1], met, count)
     files = {path: clip for (path, _), clip in zip(named, loaded)}

@@ -144,7 +144,7 @@ def _convert(
     if onto is not None:
         made = retarget(made, rig)
         kept = _kept(clip, rig) if other_rig(clip, rig) else []
-    made = replace(resample(made, fps, smooth=True), source=made.source) if fps is not None else made
+    made = resample(made, fps, smooth=True) if fps is not None else made
     notes = [*kept, *save(replace(made, name=output.stem), output, force=force)]
     if json:
         written = {"file": str(output), "frames": len(made), "fps": made.fps, "joints": len(made.skeleton)}

@@ -173,7 +173,7 @@ def _named(text: str) -> tuple[Path, str | None]:
 
 
 def _part(file: Path, whole: Clip, part: str) -> Clip:
-    """Some frames, with the file's layout."""
+    """Some frames of a file."""
     try:
         span = Gap.parse(part, clip=whole)
     except RequestError:
@@ -182,8 +182,7 @@ def _part(file: Path, whole: Clip, part: str) -> Clip:
     if not 0 <= span.start < span.stop <= len(whole):
         why = f"the clip has {len(whole)} frames, counted from 0"
         raise RequestError(f"there are no frames {part} in {file}", why, f"Choose some of 0:{len(whole)}.")
-    chosen = slice(span.start, span.stop)
-    return whole.with_motion(whole.rotation[chosen], whole.translation[chosen])
+    return whole.slice(span.start, span.stop)
 
 
 def _odd(pieces: list[Piece]) -> Iterator[str]:

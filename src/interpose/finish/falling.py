@@ -41,7 +41,7 @@ def landed(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
     if start == 0 and stop < len(clip):
         # Backwards in time all falls as well.
         back = Observation(known.rotation[::-1], known.translation[::-1])
-        turned = clip.with_motion(clip.rotation[::-1], clip.translation[::-1])
+        turned = clip.take(slice(None, None, -1))
         done = landed(turned, back, (len(clip) - stop, len(clip)))
         return clip if done is turned else clip.with_motion(done.rotation[::-1], done.translation[::-1])
     if start < 2 or stop < len(clip) or not feet.untold(clip, known, start, stop):

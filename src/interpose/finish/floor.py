@@ -128,7 +128,7 @@ def higher(clip: Clip, known: Observation, joints: list[int], lift: np.ndarray, 
     moved = np.flatnonzero(lift.max(axis=1, initial=0.0) > NOTHING)
     if not moved.size:
         return clip
-    part = clip.with_motion(clip.rotation[moved], clip.translation[moved])
+    part = clip.take(moved)
     seen = Observation(known.rotation[moved], known.translation[moved])
     goal, share = part.positions()[:, joints], np.minimum(lift[moved] / (size * SINK), 1.0)
     goal[..., 1] += lift[moved]

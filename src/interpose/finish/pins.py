@@ -224,7 +224,7 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) ->
     rotation, translation = done.rotation.copy(), done.translation.copy()
     for i in range(0, len(moved), BLOCK):
         at = moved[i : i + BLOCK]
-        part = done.with_motion(done.rotation[at], done.translation[at])
+        part = done.take(at)
         seen = Observation(known.rotation[at], known.translation[at])
         rotation[at], translation[at] = _approach(
             part, seen, joints, wanted[at], rows, heavy, hinges and hinges.at(at)

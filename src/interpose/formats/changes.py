@@ -2,21 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import BinaryIO
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import BinaryIO, Self
 
 import numpy as np
 
-from interpose.clip import Clip, Skeleton
+from interpose.clip import Clip, Skeleton, Source
 from interpose.errors import RequestError
 from interpose.formats.text import VALUE_LIMIT, FrameText
 
 NAMED = 5  # joints in a note
-# Puts the clip's frames from `start` into values (n, C), of which the first `known` are the file's own, and
+# Puts the clip's frames from `start` into values (n, C), which where `known` (n,) are the file's own, and
 # returns (n, C) True where a number may have changed: put(values, known, start, previous), where `previous`
 # (C,) are the numbers of the frame before.
-Put = Callable[[np.ndarray, int, int, np.ndarray], np.ndarray]
+Put = Callable[[np.ndarray, np.ndarray, int, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class TextSource:
+    """What a text file has and a clip does not: kept beside the clip so that writing gives the same file.
+
+    Attributes:
+        motion: the frames' original text.
+        skeleton: the skeleton as read.
+        at: (n,) the file's frame that each of the clip's was, -1 for none; of a longer clip, the first ones.
+    """
+
+    motion: FrameText
+    skeleton: Skeleton
+    at: np.ndarray
+
+    def take(self, frames: slice | np.ndarray) -> Self:
+        """As `Source.take`."""
+        if not isinstance(frames, slice):
+            return replace(self, at=np.append(self.at, -1)[np.minimum(frames, len(self.at))])
+        return replace(self, at=self.at[frames])
+
+    def along(self, parts: Sequence[tuple[Source | None, int]]) -> Self:
+        """As `Source.along`."""
+        own = [
+            source.take(np.arange(count)).at
+            if isinstance(source, TextSource) and source.motion is self.motion
+            else np.full(count, -1)
+            for source, count in parts
+        ]
+        return replace(self, at=np.concatenate(own))
 
 
 def same_skeleton(mine: Skeleton, other: Skeleton) -> bool:
@@ -36,37 +67,40 @@ def check_values(values: np.ndarray) -> None:
         raise RequestError("cannot write this motion", why, "Bring it nearer to the origin, or write .npz.")
 
 
-def write_frames(motion: FrameText, frames: int, put: Put, stream: BinaryIO, line_end: bytes) -> None:
-    """Write `frames` frames: the text of `motion` with the numbers that `put` changes exchanged."""
+def write_frames(source: TextSource, frames: int, put: Put, stream: BinaryIO, line_end: bytes) -> None:
+    """Write `frames` frames: the text of those that the file has, with the numbers that `put` changes
+    exchanged."""
+    motion = source.motion
     style = motion.style()
     previous = np.zeros(motion.channels)
-
-    def kept(start: int, stop: int) -> bytes:
-        """The original text of some frames. The last one may lack a line end that it needs now."""
-        text = motion.raw(start, stop) if start < stop else b""
-        return text.rstrip() + line_end if text and stop == len(motion) < frames else text
-
+    own = source.take(np.arange(frames)).at
     for start in range(0, frames, motion.chunk):
-        stop = min(start + motion.chunk, frames)
-        known = max(0, min(stop, len(motion)) - start)
-        values = np.zeros((stop - start, motion.channels))
-        if known:
-            values[:known] = motion.values(start, start + known)
-        old = values[:known].copy()
+        at = own[start : start + motion.chunk]
+        known, values = at >= 0, np.zeros((len(at), motion.channels))
+        for first, last in _runs(at):
+            if known[first]:
+                values[first:last] = motion.values(int(at[first]), int(at[last - 1]) + 1)
+        old = values.copy()
         fresh = put(values, known, start, previous)
         previous = values[-1].copy()
         values = np.round(values, style.decimals) + 0.0  # no negative zeros
         check_values(values)
         # What comes out the same to the last written decimal did not change.
-        fresh[:known] &= np.abs(values[:known] - old) > 0.5001 * 10.0**-style.decimals
-        done = 0
-        for row in np.flatnonzero(fresh.any(axis=1)).tolist():
-            stream.write(kept(start + done, start + min(row, known)))
-            inside = row < known
-            text = kept(start + row, start + row + 1) if inside else motion.pattern(start + row, line_end)
-            stream.write(motion.exchange(text, values[row], fresh[row], style))
-            done = row + 1
-        stream.write(kept(start + done, start + known))
+        fresh[known] &= np.abs(values - old)[known] > 0.5001 * 10.0**-style.decimals
+        for first, last in _runs(np.where(known & ~fresh.any(axis=1), at, -1)):
+            # Of a frame that the file does not have the last one's text, all of whose numbers change.
+            frame = int(at[first]) if known[first] else len(motion) - 1
+            ends = start + last == frames and known[first]
+            text = motion.lines(frame, frame + last - first, start + first, None if ends else line_end)
+            changed = fresh[first].any()
+            stream.write(motion.exchange(text, values[first], fresh[first], style) if changed else text)
+
+
+def _runs(at: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Each stretch (start, stop) in which frames follow each other in the file; -1 are alone."""
+    breaks = np.flatnonzero((np.diff(at) != 1) | (at[1:] == 0)) + 1
+    edges = [0, *breaks.tolist(), len(at)]
+    return zip(edges, edges[1:])
 
 
 @dataclass

@@ -83,9 +83,11 @@ class FrameText:
         """(stop - start, C) numbers of the frames; raises FileError when one is no finite number."""
         raise NotImplementedError
 
-    def pattern(self, frame: int, line_end: bytes) -> bytes:
-        """The text of a frame behind the last one, with the last one's numbers."""
-        return self.raw(len(self) - 1, len(self)).rstrip() + line_end
+    def lines(self, start: int, stop: int, frame: int, line_end: bytes | None) -> bytes:
+        """The text of the frames start to stop - 1 where they are the frames from `frame` on. The file's last
+        one, which may lack it, is given a line end; None where it is the last one again."""
+        text = self.raw(start, stop)
+        return text if line_end is None or stop < len(self) else text.rstrip() + line_end
 
     def style(self) -> Style:
         """The style of the first numbers of the motion."""

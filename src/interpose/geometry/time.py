@@ -220,7 +220,7 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     The first frame stays the first, and the last sample is the last one that does not lie after the old
     last frame: (F - 1) / fps seconds apart when the rates divide. Rotations are interpolated by SLERP and
     translations linearly, or both with continuous velocities (`smooth`). Frames that fall on old ones are
-    those, unchanged. The file's layout is dropped: it belongs to the old frames.
+    those, unchanged, and keep the text of their numbers where the clip is written again.
 
     Raises RequestError for what is no clip, and when `fps` is no frame rate.
     """
@@ -228,7 +228,7 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
         raise unfit("clip", clip, "a clip: interpose.load reads one")
     check_rate(fps)
     if not len(clip):
-        return replace(clip, fps=fps, source=None)
+        return replace(clip, fps=fps)
     # Files round the frame time (0.033333 s): rates that are that close to a simple ratio mean it, or else
     # frames that belong together would drift apart. 29.97 and 30 are ten times as far from each other.
     step = clip.fps / fps
@@ -251,7 +251,9 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     new = np.flatnonzero(times == nearest)
     old = nearest[new].astype(int)
     rotation[new], translation[new] = clip.rotation[old], clip.translation[old]
-    return replace(clip, rotation=rotation, translation=translation, fps=fps, source=None)
+    kept = np.where(times == nearest, nearest, -1).astype(int)
+    source = clip.source.take(kept) if clip.source is not None else None
+    return replace(clip, rotation=rotation, translation=translation, fps=fps, source=source)
 
 
 def spread(clip: Clip, again: np.ndarray) -> Clip:

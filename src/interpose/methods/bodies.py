@@ -35,7 +35,7 @@ def observed_body(clip: Clip, observation: Observation) -> Humanoid:
     whole = np.flatnonzero(observation.frames)
     if whole.size:
         whole = whole[:: max(1, whole.size // 1000)]
-        return find_humanoid(clip.with_motion(clip.rotation[whole], clip.translation[whole]))
+        return find_humanoid(clip.take(whole))
     hand = {"hand": "right", **clip.skeleton.roles}
     return find_humanoid(replace(clip, skeleton=replace(clip.skeleton, roles=hand)))
 

@@ -228,7 +228,8 @@ def joined(first: Clip, clips: list[Clip]) -> Clip:
     rotation, translation = (
         np.concatenate([getattr(clip, name) for clip in clips]) for name in ("rotation", "translation")
     )
-    return first.with_motion(rotation, translation)
+    source = first.source and first.source.along([(clip.source, len(clip)) for clip in clips])
+    return replace(first, rotation=rotation, translation=translation, source=source)
 
 
 def _counts(frames: str | int | Sequence[int], gaps: int) -> list[int | None]:
@@ -293,7 +294,7 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
                 pivot = translation[0, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
                 translation[:, column] = pivot + scale * (translation[:, column] - pivot)
     fitted = replace(
-        like, rotation=clip.rotation[:, order], translation=translation, name=clip.name, source=None
+        like, rotation=clip.rotation[:, order], translation=translation, name=clip.name, source=clip.source
     )
     return (fitted if scale == 1 else _from(clip, fitted)), scale
 

@@ -130,7 +130,7 @@ class Humanoid:
         if clip is None:
             return BONES / self.scale
         step = max(1, len(clip) // 200)
-        some = clip.with_motion(clip.rotation[::step], clip.translation[::step])
+        some = clip.take(slice(None, None, step))
         points, turned = self.positions(some), self.rotations(some)
         bones = np.zeros((len(JOINTS), 3))
         for row, parent in enumerate(PARENTS):
@@ -267,7 +267,7 @@ def inside_out(mapping: Mapping, clip: Clip) -> str:
     if not mapping.usable or len(clip) == 0:
         return ""
     step = max(1, len(clip) // 100)
-    placed = clip.with_motion(clip.rotation[::step], clip.translation[::step]).positions()
+    placed = clip.take(slice(None, None, step)).positions()
     points = np.einsum("cj,fjx->fcx", mapping.weights, placed)
 
     def way(start: str, end: str) -> np.ndarray:

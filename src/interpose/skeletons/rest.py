@@ -197,7 +197,7 @@ class _Estimate:
     def __init__(self, mapping: Mapping, clip: Clip) -> None:
         self.mapping = mapping
         step = max(1, len(clip) // LOOK)
-        some = clip.with_motion(clip.rotation[::step], clip.translation[::step])
+        some = clip.take(slice(None, None, step))
         self.turned, placed = some.kinematics()
         self.points = np.einsum("cj,fjx->fcx", mapping.weights, placed)
         self.rest = np.tile([1.0, 0, 0, 0], (len(JOINTS), 1))

@@ -49,9 +49,9 @@ def blocked(
     Raises:
         RequestError: more frames than anything takes, an anchor after the last key.
     """
-    held = posed(before, last)
+    held = before.slice(last, last + 1)
     poses = {0: held, **{when: fit(pose, held)[0] for when, pose in anchors.items()}}
-    met, end = max(poses), fit(posed(after, first), held)[0]
+    met, end = max(poses), fit(after.slice(first, first + 1), held)[0]
     beside = fit(after, before)[0]
     moment = min(round(first * before.fps / after.fps), len(beside) - 1)
     said: tuple[str, ...] = ()
@@ -80,12 +80,6 @@ def blocked(
     on = Placement(shift=(float(off[0]), 0.0, float(off[2]))).of(beside.slice(moment + 1, until))
     parts = [before.slice(since, last), laid, on]
     return Blocked(joined(laid, parts), [len(parts[0]) + key for key in sorted(poses)], said)
-
-
-def posed(clip: Clip, frame: int) -> Clip:
-    """One frame, with the file's layout."""
-    part = slice(frame, frame + 1)
-    return clip.with_motion(clip.rotation[part], clip.translation[part])
 
 
 def _goes_on(clip: Clip) -> bool:

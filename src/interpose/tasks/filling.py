@@ -97,7 +97,7 @@ def fill(
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
         lo, hi = group.around(len(clip), clip.fps)
         # The file tells what its joints can do, and is not what the window is written to.
-        window, seen = replace(clip.slice(lo, hi), source=clip.source), observation.slice(lo, hi)
+        window, seen = clip.slice(lo, hi), observation.slice(lo, hi)
         other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
         led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
         way = {frame - lo: point for frame, point in points.items() if frame in led}
@@ -206,6 +206,6 @@ def _handed(clip: Clip, observation: Observation) -> Clip:
     if "hand" in clip.skeleton.roles or not frames.size:
         return clip
     frames = frames[:: max(1, frames.size // 200)]
-    body = find_humanoid(clip.with_motion(clip.rotation[frames], clip.translation[frames]))
+    body = find_humanoid(clip.take(frames))
     roles = {**clip.skeleton.roles, "hand": "left" if body.left_handed else "right"}
     return replace(clip, skeleton=replace(clip.skeleton, roles=roles))

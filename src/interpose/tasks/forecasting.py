@@ -83,7 +83,7 @@ def forecast(
     if not len(clip):
         raise RequestError("there is nothing to go on from", "the clip has no frame", "Name another clip.")
     held = np.minimum(np.arange(len(clip) + frames), len(clip) - 1)
-    longer = clip.with_motion(clip.rotation[held], clip.translation[held])
+    longer = clip.take(held)
     gap = Gap(len(clip), len(longer))
     job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
     chosen = job.method.name if method == "auto" and job.method else method

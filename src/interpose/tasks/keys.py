@@ -13,6 +13,7 @@ from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
 from interpose.observation import Gap, Pin
 from interpose.observation.observation import frame_number
+from interpose.observation.timeline import joined
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
@@ -74,11 +75,10 @@ def between(
 def _part(done: Completion, start: int, stop: int) -> Completion:
     """The frames start to stop - 1 of a completion, all of its gaps among them."""
     reports = [replace(gap, start=gap.start - start, stop=gap.stop - start) for gap in done.report.gaps]
-    clip, part = done.clip, slice(start, stop)
     return Completion(
-        clip.with_motion(clip.rotation[part], clip.translation[part]),
+        done.clip.slice(start, stop),
         lambda: raw_part(done.raw, start, stop),
-        done.provenance[part],
+        done.provenance[start:stop],
         replace(done.report, gaps=reports),
     )
 
@@ -103,8 +103,4 @@ def block(poses: Mapping[int, Clip]) -> Clip:
                 "Use poses of one character.",
             )
     held = np.repeat(sorted(poses), np.diff([*sorted(poses), max(poses) + 1]))
-    rotation, translation = (
-        np.concatenate([getattr(poses[frame], name) for frame in held])
-        for name in ("rotation", "translation")
-    )
-    return first.with_motion(rotation, translation)
+    return joined(first, [poses[frame] for frame in held.tolist()])

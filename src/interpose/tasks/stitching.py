@@ -85,7 +85,7 @@ def stitch(
             joint = int((around[0] / limits).argmax())
             jump, limit = 100 * float(around[0, joint]), 100 * float(limits[joint])
         closing = Loop(line.again.placement, line.again.why, jump, limit)
-        clip = clip.with_motion(clip.rotation[:start], clip.translation[:start])
+        clip = clip.slice(0, start)
         provenance = provenance[:start]
     return Stitched(
         clip,

@@ -61,9 +61,13 @@ class AmcText(FrameText):
         """What is wrong in the first frame from `start` on that is not like the first one."""
         return _bad_frame(self.text.tobytes(), int(self.starts[start]), self, start)
 
-    def pattern(self, frame: int, line_end: bytes) -> bytes:
-        text = super().pattern(frame, line_end)
-        return re.sub(rb"^\d+", b"%d" % (self.first + self.step * frame), text)
+    def lines(self, start: int, stop: int, frame: int, line_end: bytes | None) -> bytes:
+        """As of every text; frames are numbered anew where they are others."""
+        if start == frame:
+            return super().lines(start, stop, frame, line_end)
+        texts = [super(AmcText, self).lines(one, one + 1, one, line_end) for one in range(start, stop)]
+        numbers = [b"%d" % (self.first + self.step * (frame + i)) for i in range(len(texts))]
+        return b"".join(re.sub(rb"^\d+", number, text) for number, text in zip(numbers, texts))
 
 
 @dataclass(frozen=True)

@@ -12,23 +12,22 @@ from interpose import skeletons
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats import place
-from interpose.formats.asf_amc.amc_text import AmcHeader, AmcText, read_amc
+from interpose.formats.asf_amc.amc_text import AmcHeader, read_amc
 from interpose.formats.asf_amc.asf import Asf, find_asf, read_asf
 from interpose.formats.asf_amc.layout import Layout, bone_vectors, make_layout
+from interpose.formats.changes import TextSource
 from interpose.skeletons import find_mapping
 
 FPS = 120.0  # of CMU and HDM05, and of most that is published in this form
 
 
-@dataclass(frozen=True, eq=False)
-class AmcSource:
-    """What the two files have and a clip does not: kept beside the clip so that writing gives the same file.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class AmcSource(TextSource):
+    """What the two files have and a clip does not.
 
     Attributes:
         asf: the skeleton's file.
         header: what stands above the first frame.
-        motion: the frames' original text, with all that is above.
-        skeleton: the skeleton as read.
         layout: which number means what; its `unit` is metres per file unit, its `up` the axis.
         fps: as read.
         asf_how, unit_how, up_how, fps_how: "given", or how it was found.
@@ -36,8 +35,6 @@ class AmcSource:
 
     asf: Asf
     header: AmcHeader
-    motion: AmcText
-    skeleton: Skeleton
     layout: Layout
     fps: float
     asf_how: str
@@ -121,7 +118,19 @@ def read(
     else:
         rate, fps_how = FPS, "assumed, as the file does not say it"
     asf_how = "given" if skeleton is not None else "found beside it"
-    source = AmcSource(asf, header, motion, made, layout, rate, asf_how, unit_how, up_how, fps_how)
+    source = AmcSource(
+        motion=motion,
+        skeleton=made,
+        at=np.arange(len(motion)),
+        asf=asf,
+        header=header,
+        layout=layout,
+        fps=rate,
+        asf_how=asf_how,
+        unit_how=unit_how,
+        up_how=up_how,
+        fps_how=fps_how,
+    )
     return Clip(made, rotation, translation, rate, layout.translated, path.stem, source)
 
 

@@ -49,23 +49,23 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     stream.write(text)
     lost = Lost.nothing(len(clip.skeleton))
 
-    def put(values: np.ndarray, known: int, start: int, previous: np.ndarray) -> np.ndarray:
+    def put(values: np.ndarray, known: np.ndarray, start: int, previous: np.ndarray) -> np.ndarray:
         return _put_motion(values, known, clip, source, start, previous, lost)
 
-    write_frames(motion, len(clip), put, stream, b"\r\n" if b"\r\n" in motion.raw(0, 1) else b"\n")
+    write_frames(source, len(clip), put, stream, b"\r\n" if b"\r\n" in motion.raw(0, 1) else b"\n")
     return (*lost.notes(clip.skeleton.names), *notes)
 
 
 def _put_motion(
     values: np.ndarray,
-    known: int,
+    known: np.ndarray,
     clip: Clip,
     source: AmcSource,
     start: int,
     previous: np.ndarray,
     lost: Lost,
 ) -> np.ndarray:
-    """Put the frames of the clip from `start` into `values` (n, C), of which `known` are the file's own.
+    """Put the frames of the clip from `start` into `values` (n, C), which where `known` are the file's own.
 
     Returns (n, C) True where a number may have changed.
     """
@@ -73,10 +73,10 @@ def _put_motion(
     rotation = clip.rotation[start:stop]
     translation = translation_of(clip, layout.translated, start, stop, lost)
     turned, moved = np.ones(rotation.shape[:2], bool), np.ones(translation.shape[:2], bool)
-    if known:
-        was_rotation, was_translation = layout.decode(values[:known])
-        turned[:known] = (rotation[:known] != was_rotation).any(axis=-1)
-        moved[:known] = (translation[:known] != was_translation).any(axis=-1)
+    if known.any():
+        was_rotation, was_translation = layout.decode(values[known])
+        turned[known] = (rotation[known] != was_rotation).any(axis=-1)
+        moved[known] = (translation[known] != was_translation).any(axis=-1)
     fresh = np.zeros(values.shape, bool)
     if moved.any():
         new, off = layout.moved(values, translation)

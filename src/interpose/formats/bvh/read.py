@@ -13,7 +13,8 @@ from interpose.errors import FileError, unknown
 from interpose.formats import place
 from interpose.formats.bvh.header import Header, Node
 from interpose.formats.bvh.layout import Layout, make_layout
-from interpose.formats.bvh.motion_text import MotionText, read_text
+from interpose.formats.bvh.motion_text import read_text
+from interpose.formats.changes import TextSource
 from interpose.skeletons import find_mapping
 
 # A share of its OFFSET: what goes further along it in a twentieth of the frames does not add to it. Hips of
@@ -22,14 +23,12 @@ from interpose.skeletons import find_mapping
 ADDS = 0.12
 
 
-@dataclass(frozen=True, eq=False)
-class BvhSource:
-    """What a BVH file has and a clip does not: kept beside the clip so that writing gives the same file.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BvhSource(TextSource):
+    """What a BVH file has and a clip does not.
 
     Attributes:
         header: the part above the motion, with its original text.
-        motion: the motion's original text.
-        skeleton: the skeleton as read.
         layout: which column means what; its `unit` is metres per file unit, its `up` the axis.
         unit_how, up_how: "given", or how it was estimated.
         positions: "replace" or "add": what position channels of joints that are not roots do to the OFFSET;
@@ -38,8 +37,6 @@ class BvhSource:
     """
 
     header: Header
-    motion: MotionText
-    skeleton: Skeleton
     layout: Layout
     unit_how: str
     up_how: str
@@ -125,7 +122,17 @@ def read(
         part = slice(start, min(start + motion.chunk, len(motion)))
         values = motion.values(part.start, part.stop) if short is None else short
         rotation[part], translation[part] = layout.decode(values)
-    source = BvhSource(header, motion, skeleton, layout, unit_how, up_how, positions, positions_how)
+    source = BvhSource(
+        motion=motion,
+        skeleton=skeleton,
+        at=np.arange(len(motion)),
+        header=header,
+        layout=layout,
+        unit_how=unit_how,
+        up_how=up_how,
+        positions=positions,
+        positions_how=positions_how,
+    )
     return Clip(skeleton, rotation, translation, header.fps, layout.translated, path.stem, source)
 
 

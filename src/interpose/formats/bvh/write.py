@@ -44,10 +44,10 @@ def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str
     stream.write(motion.text[len(source.header.text) : motion.starts[0]].tobytes())
     lost = Lost.nothing(len(clip.skeleton))
 
-    def put(values: np.ndarray, known: int, start: int, previous: np.ndarray) -> np.ndarray:
+    def put(values: np.ndarray, known: np.ndarray, start: int, previous: np.ndarray) -> np.ndarray:
         return _put_motion(values, known, clip, source, start, previous, lost)
 
-    write_frames(motion, len(clip), put, stream, b"\r\n" if b"\r\n" in source.header.text else b"\n")
+    write_frames(source, len(clip), put, stream, b"\r\n" if b"\r\n" in source.header.text else b"\n")
     return lost.notes(clip.skeleton.names)
 
 
@@ -61,14 +61,14 @@ def _header(clip: Clip, header: Header) -> bytes:
 
 def _put_motion(
     values: np.ndarray,
-    known: int,
+    known: np.ndarray,
     clip: Clip,
     source: BvhSource,
     start: int,
     previous: np.ndarray,
     lost: Lost,
 ) -> np.ndarray:
-    """Put the frames of the clip from `start` into `values` (n, C), of which `known` are the file's own.
+    """Put the frames of the clip from `start` into `values` (n, C), which where `known` are the file's own.
 
     Returns (n, C) True where a number may have changed.
     """
@@ -76,10 +76,10 @@ def _put_motion(
     rotation = clip.rotation[start:stop]
     translation = translation_of(clip, layout.translated, start, stop, lost)
     turned, moved = np.ones(rotation.shape[:2], bool), np.ones(translation.shape, bool)
-    if known:
-        was_rotation, was_translation = layout.decode(values[:known])
-        turned[:known] = (rotation[:known] != was_rotation).any(axis=-1)
-        moved[:known] = translation[:known] != was_translation
+    if known.any():
+        was_rotation, was_translation = layout.decode(values[known])
+        turned[known] = (rotation[known] != was_rotation).any(axis=-1)
+        moved[known] = translation[known] != was_translation
     fresh = np.zeros(values.shape, bool)
     if moved.any():
         positions, moved = layout.positions(translation), place.axes_in_file(moved, layout.up)
