@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from interpose.finish import Completion
     from interpose.formats import load, save
     from interpose.geometry.time import resample
+    from interpose.methods.protocol import Method
     from interpose.methods.registry import names as method_names
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
@@ -122,7 +123,7 @@ def fill(
     clip: Clip | str | Path,
     gaps: AnyGap | Sequence[AnyGap] | Observation | None = None,
     *,
-    method: str = "auto",
+    method: str | Method = "auto",
     max_gap: int | str | None = None,
     only: Iterable[int] | int | None = None,
     seed: int | None = None,
@@ -139,7 +140,8 @@ def fill(
             (120, 160) or (120, 160, ["LeftArm"]), or a row of an array (n, 2). An Observation says for
             every value whether it is known. None: what a scan of the clip finds; of an empty list nothing is
             filled.
-        method: one of `method_names()`, or "auto" for what measured best at each gap's length.
+        method: one of `method_names()`, or "auto" for what measured best at each gap's length; a folder with
+            weights, or an object of your own, as `interpose.methods.protocol.Method` says.
         max_gap: frames, or seconds as in "2s"; longer gaps stay open.
         only: numbers of the gaps to fill, one or several, counted from 1 in order of time; the others stay
             open.
@@ -200,7 +202,7 @@ def recover(
     joints: str | Sequence[str] | None = None,
     frames: str | tuple[int, int] | None = None,
     *,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     place: bool = False,
@@ -239,7 +241,7 @@ def denoise(
     *,
     joints: str | Sequence[str] | None = None,
     frames: str | tuple[int, int] | None = None,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost: joints that snap to their rest pose, spikes.
@@ -282,7 +284,7 @@ def between(
     keys: Sequence[int],
     action: str = "",
     *,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     path: Mapping[int, Any] | None = None,
@@ -313,7 +315,7 @@ def forecast(
     frames: int | None = None,
     *,
     samples: int = 1,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     temperature: float = 1.0,
     progress: Callable[[float], None] | None = None,
@@ -371,7 +373,7 @@ def stitch(
     *,
     align: bool = True,
     loop: bool = False,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Stitched:

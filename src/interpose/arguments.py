@@ -74,6 +74,11 @@ def _is_observation(value: Any) -> bool:
     return value is None or isinstance(value, Observation)
 
 
+def _is_method(value: Any) -> bool:
+    """A name, a folder, or an object that has what makes a method: what it lacks is said later."""
+    return _is_path(value) or hasattr(value, "complete") or hasattr(value, "refuses")
+
+
 CLIP = (_is_clip, "a clip, or the path of one")
 SWITCH = (_is_switch, "True or False")
 KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
@@ -81,7 +86,10 @@ KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "like": CLIP,
     "clips": (_are_clips, "clips, or paths of some"),
     "observation": (_is_observation, "an Observation, or None"),
-    "method": (_is_path, 'the name of a method: "auto", or one of method_names()'),
+    "method": (
+        _is_method,
+        'the name of a method: "auto", or one of method_names(); or an object that is one',
+    ),
     "action": (lambda value: isinstance(value, str), 'a text, such as "walk"'),
     "keys": (lambda value: _one_or_several(value, is_number), "numbers of frames, such as [0, 30, 75]"),
     "joints": (

@@ -77,6 +77,28 @@ def test_methods_of_other_packages_that_are_none_say_what_they_lack(offer):
     assert len(str(error.value).splitlines()) == 3
 
 
+def test_an_object_is_a_method_in_all_that_fills(cmu_walk):
+    """One's own network, or whatever it is, with all that comes after; it is called by its name."""
+
+    class Mine(classical.Linear):
+        name = "mine"
+
+    mine, line = Mine(), "linear"
+    for ask in (
+        lambda method: interpose.fill(cmu_walk, "40:60", method=method),
+        lambda method: interpose.between(cmu_walk, [30, 60], method=method),
+        lambda method: interpose.stitch([cmu_walk, cmu_walk], 12, method=method),
+        lambda method: interpose.forecast(cmu_walk, 12, method=method),
+    ):
+        own, reference = ask(mine), ask(line)
+        assert np.array_equal(own.clip.rotation, reference.clip.rotation)
+        assert "mine" in str(own.report)
+        assert "linear" not in str(own.report)
+    assert interpose.fill(cmu_walk, "40:60", method=mine).report.to_dict()["method"] == "mine"
+    with pytest.raises(RequestError, match="cannot use a Half as a method\nit has no name and no refuses"):
+        interpose.fill(cmu_walk, "40:60", method=type("Half", (), {"complete": None})())
+
+
 def test_listing_methods_loads_no_network():
     code = (
         "import sys; from interpose.methods import registry; registry.names(); registry.get('spline'); "

@@ -6,6 +6,7 @@ from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
+from os import PathLike
 from pathlib import Path
 from typing import Any, cast
 
@@ -43,13 +44,21 @@ def names() -> tuple[str, ...]:
     return (*METHODS, *sorted(_offered()))
 
 
-def get(name: str) -> Method:
+def get(name: str | Method) -> Method:
     """The method of that name, always the same object; of a folder with weights, the method that runs them
-    as they are now.
+    as they are now; an object that is one, as it is.
 
     Raises RequestError for unknown names (with the list of known ones), for a method of another package that
-    cannot be loaded, and for a folder that is no model.
+    cannot be loaded, for a folder that is no model, and for an object that is no method.
     """
+    if not isinstance(name, str | PathLike):
+        if lacking := _lacking(name):
+            raise RequestError(
+                f"cannot use a {type(name).__name__} as a method",
+                f"it has {lacking}",
+                "Give a name, or an object as interpose.methods.protocol.Method says.",
+            )
+        return name
     if name in METHODS or name in _offered():
         return _named(name)
     if not (name and Path(name).is_dir()):
@@ -79,8 +88,8 @@ def _named(name: str) -> Method:
         method = entry.load()()
     except Exception as error:
         raise RequestError(what, f"{entry.value} of another package fails with: {error}", fix) from error
-    if lacking := [part for part in ("name", "refuses", "complete") if not hasattr(method, part)]:
-        raise RequestError(what, f"{entry.value} of another package has no {' and no '.join(lacking)}", fix)
+    if lacking := _lacking(method):
+        raise RequestError(what, f"{entry.value} of another package has {lacking}", fix)
     if method.name != name:
         # A report names methods as they do themselves, and is repeated by the name of the entry point.
         why = f"{entry.value} of another package says that its name is {method.name}"
@@ -88,7 +97,17 @@ def _named(name: str) -> Method:
     return method
 
 
-def told(name: str, action: str = "", temperature: float = 1.0) -> Method:
+def _lacking(method: object) -> str:
+    """What an object lacks of a method: "no refuses and no complete"; "" for nothing."""
+    return " and ".join(f"no {part}" for part in ("name", "refuses", "complete") if not hasattr(method, part))
+
+
+def name_of(method: str | Method) -> str:
+    """The name that reports call a method by."""
+    return str(method) if isinstance(method, str | PathLike) else method.name
+
+
+def told(name: str | Method, action: str = "", temperature: float = 1.0) -> Method:
     """The method of that name, told what the motion is ("" for nothing) and how far answers may lie apart.
 
     Raises RequestError for a method that knows no actions or has one answer only, and for an action that it

@@ -13,6 +13,7 @@ from interpose.finish import Completion, Provenance
 from interpose.finish.denoise import denoised
 from interpose.methods import registry
 from interpose.methods.classical import Spline
+from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.broken import broken
 from interpose.observation.exchange import put_back
@@ -30,7 +31,7 @@ def denoise(
     strength: float = 1.0,
     joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.

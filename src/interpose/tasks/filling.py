@@ -14,8 +14,8 @@ from interpose.finish import Completion, GapReport, Provenance, Report, complete
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
 from interpose.geometry.time import resample
-from interpose.methods import auto
-from interpose.methods.protocol import Raw
+from interpose.methods import auto, registry
+from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
@@ -28,11 +28,11 @@ from interpose.tasks.windows import OVERLAP, Piece, joined, paste, put_together,
 def fill(
     clip: Clip,
     gaps: Sequence[Gap] | Observation,
-    method: str = "auto",
+    method: str | Method = "auto",
     max_gap: int | str | None = None,
     only: Iterable[int] | int | None = None,
     seed: int | None = None,
-    methods: Mapping[int, str] | None = None,
+    methods: Mapping[int, str | Method] | None = None,
     progress: Callable[[float], None] | None = None,
     action: str = "",
     parts: Sequence[Part] = (),
@@ -47,8 +47,9 @@ def fill(
         clip: F frames; its values inside the gaps have no influence.
         gaps: what is missing, or an observation that says for every value whether it is known. Gaps that
             touch or overlap count as one.
-        method: a name of `methods.registry.names()`, or "auto" for what measured best at each gap's length:
-            values that an observation misses for moments it interpolates one by one.
+        method: a name of `methods.registry.names()`, an object that is a method, or "auto" for what measured
+            best at each gap's length: values that an observation misses for moments it interpolates one by
+            one.
         max_gap: frames, or seconds as in "2s"; longer gaps stay open.
         only: numbers of the gaps to fill, counted from 1 in order of time; the others stay open.
         seed: for methods that sample.
@@ -106,7 +107,7 @@ def fill(
         if progress:
             progress((done + 1) / len(work))
     left = [job.gap for job in jobs if job.method is None]
-    filled = whole.completion(Report(method, whole.told(), left, action))
+    filled = whole.completion(Report(registry.name_of(method), whole.told(), left, action))
     return with_moments(filled, clip, brief) if brief else filled
 
 

@@ -12,7 +12,7 @@ from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
 from interpose.finish.opinion import refusal
 from interpose.methods import registry
-from interpose.methods.protocol import Sampler
+from interpose.methods.protocol import Method, Sampler
 from interpose.observation import Gap, Observation, timeline
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import plan, seed_of
@@ -44,7 +44,7 @@ def forecast(
     clip: Clip,
     frames: int | None = None,
     samples: int = 1,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     temperature: float = 1.0,
     progress: Callable[[float], None] | None = None,
@@ -86,15 +86,16 @@ def forecast(
     longer = clip.take(held)
     gap = Gap(len(clip), len(longer))
     job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
-    chosen = job.method.name if method == "auto" and job.method else method
+    chosen = job.method if method == "auto" and job.method else method
+    name = registry.name_of(chosen)
     if samples > 1 and job.method and (why := refusal(job.method, longer, gap)):
         raise RequestError(
             f"cannot draw {samples} samples",
-            f"{chosen} refuses: {why}",
+            f"{name} refuses: {why}",
             "Ask for one, or give it more to see.",
         )
     if samples > 1 and not isinstance(registry.get(chosen), Sampler):
-        raise registry.one_answer(f"cannot draw {samples} samples with {chosen}")
+        raise registry.one_answer(f"cannot draw {samples} samples with {name}")
     seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]
 
     def part(i: int) -> Callable[[float], None] | None:
@@ -107,7 +108,7 @@ def forecast(
         if samples > 1 and told.method != one.report.method:
             raise RequestError(
                 f"cannot draw {samples} samples",
-                f"{chosen} fails here, and {told.method}, which fills in for it, has one answer only",
+                f"{name} fails here, and {told.method}, which fills in for it, has one answer only",
                 "Ask for one: its report says why.",
             )
         done.append(one)

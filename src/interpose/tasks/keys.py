@@ -11,6 +11,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
+from interpose.methods.protocol import Method
 from interpose.observation import Gap, Pin
 from interpose.observation.observation import frame_number
 from interpose.observation.timeline import joined
@@ -22,7 +23,7 @@ def between(
     clip: Clip,
     keys: Sequence[int],
     action: str = "",
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     cut: bool = False,

@@ -30,10 +30,10 @@ class Job:
 def plan(
     clip: Clip,
     observation: Observation,
-    method: str,
+    method: str | Method,
     max_gap: int | None,
     only: Iterable[int] | int | None,
-    methods: Mapping[int, str],
+    methods: Mapping[int, str | Method],
     action: str = "",
     temperature: float = 1.0,
 ) -> list[Job]:

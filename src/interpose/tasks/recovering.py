@@ -12,6 +12,7 @@ from interpose.errors import RequestError
 from interpose.finish import Completion, Provenance
 from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
+from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.broken import broken
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
@@ -24,7 +25,7 @@ def recover(
     clip: Clip,
     joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     place: bool = False,

@@ -9,6 +9,7 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, on_rig_of, seams
 from interpose.finish.measures import acceleration
+from interpose.methods.protocol import Method
 from interpose.observation import Observation, gait, timeline
 from interpose.skeletons import find_humanoid
 from interpose.tasks.filling import fill
@@ -52,7 +53,7 @@ def stitch(
     align: bool = True,
     loop: bool = False,
     action: str = "",
-    method: str = "auto",
+    method: str | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Stitched:
@@ -143,7 +144,7 @@ def cycle(clip: Clip) -> Cycle:
 
 
 def _tried(
-    line: timeline.Timeline, method: str, action: str, seed: int | None
+    line: timeline.Timeline, method: str | Method, action: str, seed: int | None
 ) -> tuple[list[int], list[str]]:
     """How long each gap should be, and why: where strides do not tell it, as long as feet slide least with
     the motion beside it, from its length on up to TRIED more."""
