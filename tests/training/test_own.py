@@ -91,6 +91,10 @@ def test_weights_of_ones_own_are_made_judged_and_used(takes, data, capsys):
     assert [one["name"] for one in card["data"]] == ["lafan1", "bandai", "pfnn", "cmu", "own"]
     assert "your own clips" in card["licence"]
     assert card["training"]["earlier"][-1]["recipe"].startswith("interpose train base")
+    assert card["training"]["recipe"].startswith("interpose train --from")
+    assert card["training"]["steps"] == 2
+    steps = [json.loads(line)["step"] for line in Path("mine/log.jsonl").read_text().splitlines()]
+    assert max(steps) == 2  # what it began with was measured on other clips
     shutil.copy(data / "cmu_walk.bvh", "take.bvh")
     assert main(["fill", "take.bvh", "--gap", "60:80", "--method", "mine"]) == 0
     assert json.loads(Path("take.filled.json").read_text())["gaps"][0]["method"] == "mine"

@@ -66,7 +66,8 @@ class _Run:
         packs: what it learned from.
         splits: the parts of them.
         settings: its own.
-        log: after that of the weights that it started from.
+        log: after that of the weights that it started from, but for a user's own clips: figures of the one
+            and the other are of other motion.
         earlier: what their card said of their training.
         auto: what `auto` goes by. It stays as measured on the weights that the run started from: a run that
             goes on may train on the performers that it was measured with. Of a first run it is not measured
@@ -118,7 +119,7 @@ class _Run:
         known = (folder, packs, kept_splits or list(splits) or ["train"], settings)
         if not (folder / "earlier.json").exists():
             return cls(*known, lines("log.jsonl"), [], {"from_gap": 61})
-        before = lines("earlier.jsonl")
+        before = [] if _are_own(packs) else lines("earlier.jsonl")
         steps, hours = (before[-1]["step"], before[-1]["hours"]) if before else (0, 0.0)
         after = [
             {**entry, "step": entry["step"] + steps, "hours": round(entry["hours"] + hours, 4)}
@@ -163,13 +164,14 @@ class _Run:
 
     def training(self, recipe: str, model: torch.nn.Module) -> dict[str, Any]:
         """How the weights came to be, for the card."""
+        kind = "--from WEIGHTS --data CLIPS" if _are_own(self.packs) else recipe
         return {
-            "recipe": f"interpose train {recipe}"
+            "recipe": f"interpose train {kind}"
             + (", going on from what `earlier` tells of" if self.earlier else ""),
             **self.settings,
             "splits": self.splits,
             "steps": self.log[-1]["step"],
-            "device_hours": self.log[-1]["hours"],  # from the first start on, as the steps
+            "device_hours": self.log[-1]["hours"],  # as the steps: from where the log begins
             "earlier": self.earlier,
             "parameters": sum(p.numel() for p in model.parameters()),
             "date": datetime.date.today().isoformat(),
@@ -399,10 +401,14 @@ def narrowest(licences: list[str]) -> str:
 
 def _licence(packs: list[Pack]) -> str:
     """What may be done with weights that learned from the packs alone."""
-    names = {str(pack.dataset) for pack in packs}
-    if names == {OWN}:
+    if _are_own(packs):
         return f"{OPEN}; and what your own clips allow"
-    return FREE if names == {"cmu"} else RESEARCH
+    return FREE if {str(pack.dataset) for pack in packs} == {"cmu"} else RESEARCH
+
+
+def _are_own(packs: list[Pack]) -> bool:
+    """Whether they are a user's own clips."""
+    return {str(pack.dataset) for pack in packs} == {OWN}
 
 
 def _joined(data: list[dict[str, Any]]) -> list[dict[str, Any]]:
