@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import interpose
 from interpose.finish import anatomy, complete
 from interpose.geometry import rotations
 from interpose.methods.classical import Linear, Spline
@@ -202,6 +203,46 @@ def test_joints_that_never_turn_stay_as_they_are(cmu_walk):
     )
     moves = filled(cmu_walk, Turning("LeftToeBase", "X", hill(40))).clip.rotation[INSIDE, toe]
     assert np.abs(moves - rotation[INSIDE, toe]).max() > 0.1
+
+
+def test_what_never_turns_nearby_and_does_elsewhere_turns_in_a_gap(cmu_walk):
+    """All of the take is asked: of a neck that is held still for some seconds around the gap, say."""
+    neck, frames = cmu_walk.skeleton.index("Neck"), [*range(209), *range(209)]
+    clip = cmu_walk.take(frames)
+    clip.rotation[10:200, neck] = clip.rotation[10, neck]
+
+    class Nodding(Spline):
+        name = "nodding"
+
+        def complete(self, clip, observation, seed=None):
+            done = super().complete(clip, observation, seed).clip
+            free = ~observation.rotation[:, neck]
+            nod = np.radians(20) * np.sin(np.linspace(0, np.pi, free.sum())) ** 2
+            done.rotation[free, neck] = rotations.multiply(
+                done.rotation[free, neck], rotations.about("X", nod)
+            )
+            return Raw(done)
+
+    done = interpose.fill(clip, GAP, method=Nodding()).clip
+    assert np.ptp(done.rotation[INSIDE, neck], axis=0).max() > 0.1
+
+
+def test_a_joint_of_which_nothing_else_is_known_keeps_the_motion_that_a_method_gives_it(cmu_walk):
+    """In less than two seconds a spline over all of it would be the rest pose, which does not whirl."""
+    clip = cmu_walk.slice(40, 62)
+    known = Observation.from_gaps(clip, [Gap(0, 22, ("Spine",))])
+    spine = clip.skeleton.index("Spine")
+    degrees = np.where(np.arange(22) < 11, 0.0, 120.0)
+    turned = rotations.multiply(clip.rotation[:, spine], rotations.about("X", np.radians(degrees)))
+
+    class Stepping(Spline):
+        def complete(self, clip, observation, seed=None):
+            done = super().complete(clip, observation, seed).clip
+            done.rotation[:, spine] = turned
+            return Raw(done)
+
+    done = complete(clip, known, Stepping()).clip
+    assert rotations.angle(done.rotation[[2, 20], spine], turned[[2, 20]]).max() < 0.1
 
 
 def test_nobody_is_told_to_key_what_comes_next(cmu_walk):

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from interpose import formats
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Provenance, arms, complete, guarantees, measures, seams
@@ -304,6 +305,71 @@ def test_what_a_method_says_of_feet_is_of_its_own_motion(walk):
     done = [complete(walk, seen, Sure(stands)) for stands in (0.0, 1.0, np.nan)]
     assert {one.report.gaps[0].method for one in done} == {"spline"}
     assert len({bytes_of(one.clip) for one in done}) == 1
+
+
+@pytest.mark.parametrize("ahead", [False, True])
+@pytest.mark.parametrize("which", ["spline", "speaking"])
+def test_what_a_simpler_method_says_is_finished_like_any_word(walk, data, speaking, which, ahead):
+    """Knees bend as they do, bodies come down, and what speaks positions is heard: as if it was asked."""
+    clip, known = walk, gaps_of(walk, (40, 80))
+    if ahead:  # in the air, at the end of what is known of a jump
+        jump = formats.load(data / "cmu_jump.bvh").slice(1, 30)
+        clip = jump.take([*range(29), *[28] * 30])
+        known = gaps_of(clip, (29, 59))
+    fallback = Spline() if which == "spline" else speaking(clip, sigma=0.02)
+    asked, fell = complete(clip, known, fallback), complete(clip, known, Sure(np.nan), fallback=fallback)
+    assert {gap.method for gap in fell.report.gaps} == {fallback.name}
+    np.testing.assert_allclose(fell.clip.positions(), asked.clip.positions(), atol=2e-3)
+
+
+class Torn(Spline):
+    """The body is 15 cm higher in frame 75 alone."""
+
+    name = "torn"
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        done = super().complete(clip, observation, seed).clip
+        lift = np.where(np.arange(len(clip)) == 75, 0.15, 0.0)[:, None, None] * [0.0, 1.0, 0.0]
+        return Raw(done.with_motion(done.rotation, done.translation + lift))
+
+
+def test_where_a_spline_leads_is_said_of_the_motion_that_stays(walk):
+    """Be it the method's own or the simpler one's."""
+    known, says = gaps_of(walk, (60, 90)), "a spline leads over frames 7"
+    for done in (complete(walk, known, Torn()), complete(walk, known, Sure(np.nan), fallback=Torn())):
+        assert any(note.startswith(says) for note in done.report.gaps[0].notes)
+    done = complete(walk, known, Torn(), fallback=Sure(np.nan))
+    assert any(note.startswith(says) for note in done.report.gaps[0].notes)
+
+
+def test_a_method_is_asked_once(walk):
+    class Counting(Spline):
+        name, asked = "counting", 0
+
+        def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+            Counting.asked += 1
+            return super().complete(clip, observation, seed)
+
+    complete(walk, gaps_of(walk, (40, 80)), Refusing(), fallback=Counting())
+    assert Counting.asked == 1
+
+
+class Nodding(Linear):
+    """The neck turns by a third of a turn, of which nothing is known."""
+
+    name = "nodding"
+
+    def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+        raw = super().complete(clip, observation, seed)
+        neck, rotation = clip.skeleton.index("Neck"), raw.clip.rotation.copy()
+        rotation[:, neck] = rotations.about("X", 2.0 * np.sin(np.arange(len(clip)) / 40))
+        return Raw(raw.clip.with_motion(rotation, raw.clip.translation))
+
+
+def test_only_the_rest_pose_is_said_to_be_it(walk):
+    known = Observation.from_gaps(walk, [Gap(0, len(walk), ("Neck",))])
+    told = [" ".join(complete(walk, known, method).report.gaps[0].notes) for method in (Linear(), Nodding())]
+    assert ["only the rest pose" in notes for notes in told] == [True, False]
 
 
 class Kicking(Linear):

@@ -9,9 +9,11 @@ import pytest
 
 from interpose import tasks
 from interpose.errors import RequestError
-from interpose.finish import anatomy, feet, pins, seams
+from interpose.finish import Provenance, anatomy, feet, pins, seams
 from interpose.geometry import rotations
 from interpose.methods.base import pinned
+from interpose.methods.classical import Spline
+from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Pin
 from interpose.skeletons import JOINTS, find_humanoid, find_mapping
 from interpose.skeletons.humanoid import reflect
@@ -205,6 +207,44 @@ def test_a_path_and_a_pin_are_both_reported(cmu_walk):
     gap = tasks.fill(cmu_walk, [GAP], "spline", path=path, pins=[lifted(cmu_walk)]).report.gaps[0]
     assert gap.pins < 0.1
     assert gap.path is not None
+
+
+def test_what_is_said_of_a_motion_is_said_of_it_with_a_pin(cmu_walk):
+    """How the method's own was, what was done to it, and what the path does to it."""
+
+    class Torn(Spline):
+        name = "torn"
+
+        def complete(self, clip, observation, seed=None):
+            done = super().complete(clip, observation, seed).clip
+            done.translation[75, 0, 1] += 0.15
+            return Raw(done)
+
+    pin = lifted(cmu_walk, 90, up=(0, 0.02, 0))
+    plain, pinned = (tasks.fill(cmu_walk, [GAP], Torn(), pins=some) for some in ((), [pin]))
+    one, other = plain.report.gaps[0], pinned.report.gaps[0]
+    assert one.seam_before == other.seam_before
+    assert one.foot_slide_before == other.foot_slide_before
+    (led,) = [note for note in one.notes if note.startswith("a spline leads")]
+    assert led in other.notes
+    corrected = plain.provenance == Provenance.CORRECTED
+    assert corrected.any()
+    assert (pinned.provenance[corrected] == Provenance.CORRECTED).all()
+    arm = cmu_walk.skeleton.index("LeftArm")
+    assert (pinned.provenance[88:93, arm] == Provenance.CORRECTED).all()
+    point = {85: cmu_walk.root[85, [0, 2]] + [1.5, 0.0]}
+    for some in ((), [pin]):
+        gap = tasks.fill(cmu_walk, [GAP], "spline", path=point, pins=some).report.gaps[0]
+        assert sum(note.startswith("the path is met") for note in gap.notes) == 1
+        assert any("times as long as without the path" in note for note in gap.notes)
+
+
+def test_a_spline_does_not_lead_over_what_is_pinned(cmu_walk):
+    """It would be put back, and jump."""
+    pin = lifted(cmu_walk, GAP.start + 3, up=(0, 0.6, 0))
+    gap = tasks.fill(cmu_walk, [GAP], "small", pins=[pin]).report.gaps[0]
+    assert gap.pins < 0.1
+    assert not any(note.startswith("a spline leads") for note in gap.notes)
 
 
 def test_what_a_network_expects_is_kept(cmu_walk):

@@ -90,3 +90,11 @@ def test_parts_that_do_not_fit_are_refused(cmu_walk, part):
     ):
         with pytest.raises(interpose.RequestError, match=why):
             lay(cmu_walk, seen, [wrong])
+
+
+def test_a_body_stands_anew_on_a_leg_that_is_laid_on_it(cmu_walk, data):
+    """Be it the thigh and the knee alone: they move the foot."""
+    part = Part(interpose.load(data / "cmu_jump.bvh"), 60, 68, 76, ("LeftUpLeg", "LeftLeg"))
+    reports = interpose.fill(cmu_walk, (60, 100), method="small", parts=part).report.gaps
+    assert max(gap.foot_slide or 0.0 for gap in reports) < 32
+    assert not any("slide" in note for gap in reports for note in gap.notes)

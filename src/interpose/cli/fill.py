@@ -207,7 +207,7 @@ def _dry_run(
     clip, seen = lay(clip, Observation.from_gaps(clip, request.gaps), parts)
     seen = replace(seen, pins=tuple(pins))
     spans(clip, seen, points)
-    jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods)
+    jobs = tasks.plan(clip, seen, request.method, max_gap, request.only, request.methods, request.action)
     code, ends = 4 if request.left or any(job.method is None for job in jobs) else 0, ""
     try:
         for read in (file, *(one.file for one in request.parts)):

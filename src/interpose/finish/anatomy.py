@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
+from interpose.finish.leading import led_over
 from interpose.finish.span import Span, write
 from interpose.finish.windows import rounded
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP
 from interpose.geometry.time import hermite, runs
-from interpose.methods.classical import Spline
 from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_humanoid
 from interpose.skeletons.carrier import hips_of
@@ -127,8 +127,8 @@ def straightened(opinion: Clip, known: Observation) -> Clip:
     )
 
 
-def locked(clip: Clip, known: Observation) -> Observation:
-    """What is known, and that joints stay as they are that never turn where they are seen, while others do.
+def still(clip: Clip, known: Observation) -> np.ndarray:
+    """(J,) True for joints that never turn where they are seen, for a second or longer, while others do.
 
     Toes of some rigs have never been captured, nor what stands between hips and thighs.
     """
@@ -136,7 +136,12 @@ def locked(clip: Clip, known: Observation) -> Observation:
     for joint in np.flatnonzero(known.rotation.sum(axis=0) >= clip.fps):
         seen = clip.rotation[known.rotation[:, joint], joint]
         still[joint] = (np.abs(rotations.alike(seen, seen[:1]) - seen[0]) < LOCKED).all()
-    return replace(known, rotation=known.rotation | still) if still.mean() <= MOVING else known
+    return still if still.mean() <= MOVING else np.zeros_like(still)
+
+
+def locked(known: Observation, still: np.ndarray) -> Observation:
+    """What is known, and that joints that are `still` (J,) stay as they are."""
+    return replace(known, rotation=known.rotation | still)
 
 
 def unspun(opinion: Clip, known: Observation) -> Clip:
@@ -257,17 +262,16 @@ def calm(current: Clip, known: Observation, span: Span) -> None:
         found = whirl(led, seen, start, stop, fixed | stuck)
         if found is None:
             break
-        for seconds in MENDS:
-            half = max(1, round(seconds * current.fps))
-            free = np.zeros_like(seen.rotation)
-            free[max(start, found.frame - half) : min(stop, found.frame + half), found.joint] = True
-            done = Spline().complete(led, Observation(~free | seen.rotation, np.ones_like(free))).clip
+
+        def off(done: Clip, *_: int, found: Whirl = found) -> float:
             again = whirl(done, seen, start, stop, fixed | stuck)
-            if again is None or again.joint != found.joint or _milder(again, found):
-                led = done
-                break
-        else:
+            return 2.0 * (again is not None and again.joint == found.joint and not _milder(again, found))
+
+        better = led_over(led, seen, (start, stop), (found.frame,) * 2, MENDS, off, [found.joint])
+        if better is None or better.off > 1:
             stuck.add(found.joint)
+        else:
+            led = better.clip
     write(current, led, span.start, (start, stop))
 
 

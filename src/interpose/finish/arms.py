@@ -14,7 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton
 from interpose.finish import feet, measures
-from interpose.methods.classical import Spline
+from interpose.finish.leading import led_over
 from interpose.observation import Observation
 from interpose.skeletons import find_mapping
 
@@ -63,10 +63,15 @@ def steadied(clip: Clip, known: Observation, firm: Observation, span: tuple[int,
             worst = _worst(jumps, (start, stop))
             if jumps[worst] <= most:
                 break
-            led, jump = _led(clip, firm, arm, (start, stop), worst, most)
-            if jump >= jumps[worst]:
+
+            def off(done: Clip, *part: int, arm: Arm = arm) -> float:
+                jumps = _jumps(done, arm)
+                return float(jumps[_worst(jumps, part)]) / most
+
+            led = led_over(clip, firm, span, (worst, worst + 1), MENDS, off, arm.chain)
+            if led is None or led.off * most >= jumps[worst]:
                 break
-            clip = led
+            clip = led.clip
     return clip
 
 
@@ -86,28 +91,7 @@ def _jumps(clip: Clip, arm: Arm) -> np.ndarray:
     return np.pad(measures.acceleration(placed[:, arm.hand] - placed[:, arm.chain[0]]), 1)
 
 
-def _worst(jumps: np.ndarray, part: tuple[int, int]) -> int:
+def _worst(jumps: np.ndarray, part: tuple[int, ...]) -> int:
     """The frame of the largest of the jumps (F,) in frames start to stop - 1 and beside."""
     first = max(part[0] - 1, 0)
     return first + int(jumps[first : part[1] + 1].argmax())
-
-
-def _led(
-    clip: Clip, firm: Observation, arm: Arm, span: tuple[int, int], worst: int, most: float
-) -> tuple[Clip, float]:
-    """The clip with a spline that leads an arm around the frame at which its hand jumps worst, over as few
-    frames as bring that below `most`, or else those with which it jumps least; and how far it does there."""
-    found = [(clip, np.inf)]
-    for seconds in MENDS:
-        half = max(1, round(seconds * clip.fps))
-        part = max(span[0], worst - half), min(span[1], worst + half + 1)
-        if part == (0, len(clip)):
-            break  # nothing is left to start from
-        free = np.zeros_like(firm.rotation)
-        free[slice(*part), list(arm.chain)] = True
-        led = Spline().complete(clip, Observation(~free | firm.rotation, np.ones_like(free))).clip
-        jumps = _jumps(led, arm)
-        found.append((led, float(jumps[_worst(jumps, part)])))
-        if found[-1][1] <= most:
-            break
-    return min(found, key=lambda one: one[1])

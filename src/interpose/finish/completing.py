@@ -13,7 +13,8 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.finish import feet, pins
-from interpose.finish.guarantees import Ask, guaranteed
+from interpose.finish.gap_report import same
+from interpose.finish.guarantees import STEPPED, STEPS, Ask, guaranteed
 from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.opinion import certain, wipe
 from interpose.finish.path import follow, over_floor, spans
@@ -28,6 +29,8 @@ FAR = 1.5
 UNMOVED = 0.01
 # A path on which the hips go this much further than without it is said to be too long.
 FURTHER = 1.5
+# How notes on a path begin, and what is said of one that is too long.
+MET, LONG = "the path is met within", "times as long as without the path"
 
 
 def complete(
@@ -37,6 +40,7 @@ def complete(
     seed: int | None = None,
     fallback: Method | None = None,
     limits: np.ndarray | None = None,
+    still: np.ndarray | None = None,
     path: Mapping[int, np.ndarray] | None = None,
     first: int = 0,
 ) -> Completion:
@@ -54,6 +58,7 @@ def complete(
         fallback: the simpler method.
         limits: (J,) metres per frame squared, the largest velocity jumps allowed at a seam, when `clip` is a
             window of a longer one. Default: the clip's own, see `seams.limits`.
+        still: (J,) joints that never turn, likewise. Default: see `anatomy.still`.
         path: x and z in metres that the hips are to be over, by frame; inside of gaps of the whole pose.
         first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
@@ -62,7 +67,7 @@ def complete(
             point of the path lies in no gap of the whole pose with known frames on both sides.
     """
     observation.check(clip)
-    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limits, first), path)
+    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limits, still, first), path)
 
 
 def _complete(
@@ -84,12 +89,14 @@ def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -
     """Complete the body on which known joints (F, J) hang, and lay them on it."""
     body = _complete(clip, without(observation, hanging), ask, None)
     # On other legs a body stands anew.
-    legs = hanging[:, feet.ends(clip.skeleton)].any()
-    layer = Layer(ask.method.name, body.clip, body.raw, hanging, stands=not legs)
+    legs = [joint for leg in feet.legs(clip.skeleton) for joint in (leg.thigh, leg.knee, *leg.foot)]
+    anew = bool(hanging[:, legs].any())
+    layer = Layer(ask.method.name, body.clip, body.raw, hanging, stands=not anew)
     # Where some joints that are laid on a body jump, another body would not help: it is said, and this
     # one kept. Where most of them are, it is rather the body that does not fit.
     simpler: Method = layer if hanging.any(axis=0).mean() < MOST else ask.fallback
-    return _told_of(body, _complete(clip, observation, replace(ask, method=layer, fallback=simpler), None))
+    done = _complete(clip, observation, replace(ask, method=layer, fallback=simpler), None)
+    return _told_of(body, done, (STEPS, STEPPED) if anew else ())
 
 
 def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation, ask: Ask) -> Completion:
@@ -109,23 +116,27 @@ def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation,
     ways = over_floor(body.clip), over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
-        off = [ways[1][f] - p for f, p in path.items() if gap.start <= f < gap.stop]
-        if not off:
-            return gap
-        missed = 100 * float(np.linalg.norm(off, axis=1).max())
-        notes = [f"the path is met within {missed:.1f} cm"]
+        gap = _on_path(gap, path, ways[1])
         own, new = (
             np.linalg.norm(np.diff(way[gap.start - 1 : gap.stop + 1], axis=0), axis=1).sum() for way in ways
         )
-        if new > FURTHER * own:
-            notes.append(
-                f"flagged: its way of {new:.1f} m is {new / own:.1f} times as long as without the path, and "
-                "steps are too short for it. A longer gap or a nearer point helps"
-            )
-        return replace(gap, path=missed, notes=(*gap.notes, *notes))
+        if gap.path is None or new <= FURTHER * own:
+            return gap
+        said = f"flagged: its way of {new:.1f} m is {new / own:.1f} {LONG}, and steps are too short for it"
+        return replace(gap, notes=(*gap.notes, f"{said}. A longer gap or a nearer point helps"))
 
     reports = [judged(gap) for gap in done.report.gaps]
     return replace(done, report=replace(done.report, gaps=reports))
+
+
+def _on_path(gap: GapReport, path: Mapping[int, np.ndarray], way: np.ndarray) -> GapReport:
+    """A report that says by how much the hips, whose way over the floor is (F, 2), miss the path."""
+    off = [float(np.linalg.norm(way[f] - p)) for f, p in path.items() if gap.start <= f < gap.stop]
+    if not off:
+        return gap
+    missed = 100 * max(off)
+    others = (note for note in gap.notes if not note.startswith(MET))
+    return replace(gap, path=missed, notes=(*others, f"{MET} {missed:.1f} cm"))
 
 
 @dataclass
@@ -163,10 +174,7 @@ def _pinned(
     way = over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
-        points = [np.linalg.norm(way[f] - p) for f, p in (path or {}).items() if gap.start <= f < gap.stop]
-        if points:
-            missed = 100 * float(max(points))
-            gap = replace(gap, path=missed, notes=(*gap.notes, f"the path is met within {missed:.1f} cm"))
+        gap = _on_path(gap, path or {}, way)
         inside = [one for one in off if gap.start <= one[1] < gap.stop]
         if not inside:
             return gap
@@ -189,25 +197,30 @@ def _pinned(
     return replace(done, report=replace(done.report, gaps=reports))
 
 
-def _told_of(body: Completion, done: Completion) -> Completion:
-    """What was laid on a body, or led, with what its report says of gaps that a simpler method filled."""
-    before = {
-        frame: gap
-        for gap in body.report.gaps
-        if gap.method != done.report.method
-        for frame in range(gap.start, gap.stop)
-    }
-    reports = [
-        replace(
+def _told_of(body: Completion, done: Completion, but: tuple[str, ...] = ()) -> Completion:
+    """What was laid on a body, or led, with what is to be said of that: how far the method's own motion was
+    off, by what a gap was filled instead, and what was done to it, `but` for some. What is flagged is judged
+    anew."""
+    before = {frame: gap for gap in body.report.gaps for frame in range(gap.start, gap.stop)}
+
+    def told(gap: GapReport) -> GapReport:
+        if (one := before.get(gap.start)) is None:
+            return gap
+        if one.method != done.report.method == gap.method:
+            gap = replace(gap, method=one.method, model=None)
+        kept = [note for note in one.notes if not note.startswith("flagged") or LONG in note]
+        kept = [note for note in kept if note not in (*but, *gap.notes)]
+        return replace(
             gap,
-            method=one.method,
-            model=None,
-            notes=(*(n for n in one.notes if n not in gap.notes), *gap.notes),
+            seam_before=one.seam_before,
+            foot_slide_before=one.foot_slide_before,
+            solve_error=one.solve_error,
+            notes=(*kept, *gap.notes),
         )
-        if (one := before.get(gap.start)) and gap.method == done.report.method
-        else gap
-        for gap in done.report.gaps
-    ]
-    fell = (body.provenance == Provenance.FALLBACK) & (done.provenance != Provenance.OBSERVED)
-    provenance = np.where(fell, Provenance.FALLBACK, done.provenance).astype(done.provenance.dtype)
-    return replace(done, provenance=provenance, report=replace(done.report, gaps=reports))
+
+    codes = done.provenance.copy()
+    moved = (body.provenance == Provenance.CORRECTED) | ~same(body.clip, done.clip)
+    codes[(codes == Provenance.METHOD) & moved] = Provenance.CORRECTED
+    codes[(codes != Provenance.OBSERVED) & (body.provenance == Provenance.FALLBACK)] = Provenance.FALLBACK
+    report = replace(done.report, gaps=[told(gap) for gap in done.report.gaps])
+    return replace(done, provenance=codes, report=report)

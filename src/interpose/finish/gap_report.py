@@ -40,6 +40,8 @@ def gap_report(
     glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
     never = [] if own and "model" in raw.notes else notes.never(known, gap, skeleton.names)
+    # A method that says something else of them than how they rest has something to say.
+    never = [name for name in never if _rests(part, skeleton.index(name))]
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
     risk = _risk(raw, finished, known, gap) if own else None
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
@@ -84,6 +86,12 @@ def gap_report(
     )
 
 
+def _rests(clip: Clip, joint: int) -> bool:
+    """Whether a joint has the rest pose in every frame."""
+    rest = clip.skeleton.rest_rotation[joint]
+    return bool((rotations.angle(clip.rotation[:, joint], rest) < 1e-6).all())
+
+
 def _risk(raw: Raw, finished: Clip, known: Observation, gap: Gap) -> np.ndarray | None:
     """Metres by frame of the gap that joints are expected to be off by of which it is not known where they
     are; None where there are none, as of a hand that is turned alone, or nobody says it."""
@@ -106,15 +114,19 @@ def provenance(
     """(F, J) codes."""
     missing = ~(known.rotation & known.translation)
     codes = np.where(missing, Provenance.METHOD, Provenance.OBSERVED).astype(np.int8)
-    # A quaternion and its negative are the same rotation.
-    same = np.abs((rotations.normalize(opinion.rotation) * finished.rotation).sum(-1)) > 1 - 1e-12
-    columns = list(finished.translated)
-    same[:, columns] &= np.abs(opinion.translation - finished.translation).max(-1) < 1e-6
-    codes[missing & ~same] = Provenance.CORRECTED
+    codes[missing & ~same(opinion, finished)] = Provenance.CORRECTED
     for span in spans:
         if span.method != method:
             codes[span.start : span.stop][missing[span.start : span.stop]] = Provenance.FALLBACK
     return codes
+
+
+def same(one: Clip, other: Clip) -> np.ndarray:
+    """(F, J) True where a joint is turned, and placed, alike in two clips."""
+    # A quaternion and its negative are the same rotation.
+    alike = np.abs((rotations.normalize(one.rotation) * other.rotation).sum(-1)) > 1 - 1e-12
+    alike[:, list(other.translated)] &= np.abs(one.translation - other.translation).max(-1) < 1e-6
+    return alike
 
 
 def slides(clip: Clip, known: Observation, span: Span, gaps: list[Gap]) -> dict[Gap, tuple[float, float]]:

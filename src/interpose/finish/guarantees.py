@@ -5,6 +5,7 @@ Precedence when they collide: observed values, then bones, then pins, then seams
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -62,6 +63,7 @@ class Ask:
     seed: int | None
     fallback: Method
     limits: np.ndarray | None
+    still: np.ndarray | None
     first: int
 
 
@@ -83,7 +85,7 @@ def guaranteed(clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> 
         return Completion(clip, lambda: Raw(clip), nothing, Report(ask.method.name))
     work.listen()
     work.look()
-    work.settle([span for span in work.spans if not span.problem], work.opinion)
+    work.settle([span for span in work.spans if not span.problem], work.opinion, work.raw)
     work.fall_back()
     return work.completion()
 
@@ -95,16 +97,17 @@ class _Work:
         bare: the clip without what is missing; `hidden` the same without what trembles beside that, which is
             what is completed.
         known: what must come back unchanged.
-        firm: what is known, and joints that never turn.
+        firm: what is known, and, of a motion that is said in rotations, joints that never turn.
         spans: the runs of frames in which something is missing; `gaps` lie within them.
         raw: what the method said; `opinion` the same as rotations, `error` (F,) how far these are from it.
         current: the clip as far as it is.
         bounds: how far velocities may jump; None where nothing is known to compare with.
         before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
-        mended: the frames of spans over which a spline leads, by the span's first.
-        stepped: what is to be said of spans that were given steps, by their first frames and whether in the
-            method's own motion.
+        still: (J,) joints that never turn.
+        simpler: what the simpler method said, where it was asked.
+        mended, stepped: the frames of spans over which a spline leads, and what is to be said of spans that
+            were given steps, by their first frames and whether in the method's own motion.
     """
 
     def __init__(self, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> None:
@@ -114,8 +117,10 @@ class _Work:
         self.known = self.firm = certain(hidden, observation)
         self.gaps = self.known.gaps(clip.skeleton)
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
+        self.still = anatomy.still(hidden, self.known) if ask.still is None else ask.still
+        self.simpler: Raw | None = None
         self.unheld: dict[Gap, tuple[float, float]] = {}
-        self.mended: dict[int, list[tuple[int, int]]] = {}
+        self.mended: dict[tuple[int, bool], list[tuple[int, int]]] = {}
         self.stepped: dict[tuple[int, bool], str] = {}
 
     def listen(self) -> None:
@@ -126,26 +131,33 @@ class _Work:
                 there = replace(gap, start=gap.start + ask.first, stop=gap.stop + ask.first)
                 self._of(gap).problem = f"{ask.method.name} refuses {there}: {reason}"
         if all(span.problem for span in self.spans):
-            self.raw = second(ask.fallback, hidden, self.observation, self.gaps, ask.seed)
+            self.raw = self.simpler = second(ask.fallback, hidden, self.observation, self.gaps, ask.seed)
         else:
             self.raw = said(ask.method, hidden, self.observation, ask.seed)
-        opinion, self.error = as_rotations(self.raw, known, self.spans)
-        if not self.layer:
-            opinion = carried(opinion, hidden, known)
-            if self.raw.positions is None:
-                opinion = anatomy.unspun(anatomy.straightened(opinion, known), known)
-                self.firm = anatomy.locked(hidden, known)
-                # Its word on frames that are known as a whole stays: from there it is eased into the gap.
-                part = ~known.frames[:, None]
-                stays = Observation(self.firm.rotation & part, self.firm.translation & part)
-                opinion = merge(opinion, hidden, stays)
-        self.opinion = held(opinion, self.clip.source)
+        self.opinion, self.error = self._hear(self.raw)
         self.current = merge(self.opinion, hidden, known)
         limits = seams.limits(self.bare, known) if ask.limits is None else ask.limits
         self.bounds = None
         if limits is not None:
             self.bounds = jumps.Bounds(limits, jumps.peak_limits(self.bare, known, limits))
         self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
+
+    def _hear(self, raw: Raw) -> tuple[Clip, np.ndarray | None]:
+        """What a method says as rotations of a body, and how far (F,) these are from its positions; which
+        joints stay `firm` in it."""
+        hidden, known = self.hidden, self.known
+        rotations_said = not self.layer and raw.positions is None
+        self.firm = anatomy.locked(known, self.still) if rotations_said else known
+        opinion, error = as_rotations(raw, known, self.spans)
+        if not self.layer:
+            opinion = carried(opinion, hidden, known)
+            if rotations_said:
+                opinion = anatomy.unspun(anatomy.straightened(opinion, known), known)
+                # Its word on frames that are known as a whole stays: from there it is eased into the gap.
+                part = ~known.frames[:, None]
+                stays = Observation(self.firm.rotation & part, self.firm.translation & part)
+                opinion = merge(opinion, hidden, stays)
+        return held(opinion, self.clip.source), error
 
     def look(self) -> None:
         """Say of spans what is wrong with the method's motion, and where it was not the method's to say."""
@@ -160,31 +172,34 @@ class _Work:
             span.problem = span.problem or _lost(self.opinion, self.hidden, self.known, span)
             span.hopeless = span.problem is not None
 
-    def settle(self, chosen: list[Span], source: Clip) -> None:
-        """Ease spans of `source` into what is known, and hold the feet: all of them take each step together,
-        as two that share a lone key are neighbours at every step."""
+    def settle(self, chosen: list[Span], source: Clip, raw: Raw) -> None:
+        """Ease spans of `source`, which is what `raw` comes to, into what is known, and hold the feet.
+
+        The order matters. A body comes down before its feet are held, which goes by the floor that
+        it comes to. Feet are held before shuffles are looked for, and once more where steps were taken. What
+        turns on the spot steps as `stepping` says, and is neither held nor lifted. Seams are softened last,
+        in all spans together: two that share a lone key are neighbours.
+        """
         current, layer, own = self.current, self.layer, source is self.opinion
         for span in chosen:
             _fade(current, source, self.hidden, self.firm, span)
             if not (layer and layer.pins):
+                # What is pinned would be put back there, and jump.
                 anatomy.calm(current, self.firm, span)
                 _steady(current, self.known, self.firm, span)
-            places = jumps.mend(current, self.firm, span, self.bounds)
-            if own:
-                self.mended[span.start] = places
+                self.mended[span.start, own] = jumps.mend(current, self.firm, span, self.bounds)
         for span in chosen:
             self.unheld.update(slides(current, self.known, span, self.gaps))
-            if own and not layer:
-                _land(current, self.firm, span)
-            if not layer and _step(current, self.firm, span):
+            if not layer:
+                _change(current, self.firm, span, falling.landed)
+            if not layer and _change(current, self.firm, span, stepping.stepped):
                 self.stepped[span.start, own] = STEPS
             elif not (own and layer and layer.stands):
-                stands = self.raw.stands if own else None
-                _plant(current, self.firm, span, self.bounds, stands)
+                _plant(current, self.firm, span, self.bounds, raw.stands)
                 if not layer and _unshuffle(current, self.firm, span, self.bounds):
                     self.stepped[span.start, own] = STEPPED
-                    _plant(current, self.firm, span, self.bounds, stands)
-                _lift(current, self.firm, span)
+                    _plant(current, self.firm, span, self.bounds, raw.stands)
+                _change(current, self.firm, span, floor.lifted)
         if self.bounds is None:
             return
         waiting, told = set(range(len(chosen))), [list[float]() for _ in chosen]
@@ -210,12 +225,12 @@ class _Work:
         if not failed:
             return
         gaps = [gap for gap in self.gaps if self._of(gap) in failed]
-        other = second(ask.fallback, self.hidden, self.observation, gaps, ask.seed).clip
-        other = held(carried(other, self.hidden, known), self.clip.source)
+        raw = self.simpler or second(ask.fallback, self.hidden, self.observation, gaps, ask.seed)
+        other, _ = self._hear(raw)
         start, own = merge(other, self.hidden, known), merge(self.current, self.hidden, known)
         for span in failed:
             write(self.current, start, span.start, (span.start, span.stop))
-        self.settle(failed, other)
+        self.settle(failed, other, raw)
         for span in failed:
             # Where the simpler method pops hardly less, there is no reason to lose the motion; nor where it
             # has only the rest pose to say.
@@ -244,10 +259,11 @@ class _Work:
         current = seated(current, known.translation, known.rotation | stays)
         current = merge(held(current, clip.source), self.bare, known)
         for span in self.spans:
-            for start, stop in self.mended.get(span.start, ()) if span.method == ask.method.name else ():
+            chosen = span.start, span.method == ask.method.name
+            for start, stop in self.mended.get(chosen, ()):
                 which = f"frames {ask.first + start} to {ask.first + stop - 1}"
                 span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
-            if steps := self.stepped.get((span.start, span.method == ask.method.name)):
+            if steps := self.stepped.get(chosen):
                 span.notes.append((span.start, span.stop - 1, steps))
             excess, above, where = jumps.excess(current, known, span, self.bounds, ask.first)
             if excess > 1:
@@ -319,22 +335,16 @@ def _steady(current: Clip, known: Observation, firm: Observation, span: Span) ->
     write(current, led, span.start, inner)
 
 
-def _land(current: Clip, known: Observation, span: Span) -> None:
-    """Let a body come down that is in the air where a span at an end of the clip begins."""
+def _change(
+    current: Clip,
+    known: Observation,
+    span: Span,
+    to: Callable[[Clip, Observation, tuple[int, int]], Clip | None],
+) -> bool:
+    """Change a span to what is made of it, told the motion nearby, what of that is known, and where the span
+    lies in it; False where that is nothing."""
     lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    write(current, falling.landed(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
-
-
-def _lift(current: Clip, known: Observation, span: Span) -> None:
-    """Lift what a span has under the floor."""
-    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    write(current, floor.lifted(current.slice(lo, hi), known.slice(lo, hi), inner), span.start, inner)
-
-
-def _step(current: Clip, known: Observation, span: Span) -> bool:
-    """Let a body that turns on the spot in a span do it in steps; False where it does not, or does well."""
-    lo, hi, inner = span.around(len(current), round(feet.NEARBY * current.fps))
-    done = stepping.stepped(current.slice(lo, hi), known.slice(lo, hi), inner)
+    done = to(current.slice(lo, hi), known.slice(lo, hi), inner)
     if done is not None:
         write(current, done, span.start, inner)
     return done is not None

@@ -8,9 +8,9 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.finish import feet, seams
+from interpose.finish.leading import led_over
 from interpose.finish.span import Span, write
 from interpose.geometry.time import runs
-from interpose.methods.classical import Spline
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping
 
@@ -132,41 +132,25 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
     # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
     frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
     places = np.zeros(len(led), bool)
+
+    def off(done: Clip, first: int, last: int) -> float:
+        return share(done, seen, np.arange(first - 1, last + 1), most)
+
     while frames.size:
         jumps = (np.linalg.norm(seams.jumps(led, seen, frames), axis=-1) / most).max(axis=1)
         if jumps.max() <= 1:
             break
-        led, (first, last) = _led_over(led, seen, (start, stop), int(frames[jumps.argmax()]), most)
-        again = places[first:last].all()
-        places[first:last] = True
+        worst = int(frames[jumps.argmax()])
+        better = led_over(led, seen, (start, stop), (worst, worst + 1), MENDS, off)
+        if better is None:
+            return []
+        led, again = better.clip, places[better.start : better.stop].all()
+        places[better.start : better.stop] = True
         if again or places.sum() > PATCHED * (stop - start):
             return []
     if places.any():
         write(current, led, span.start, (start, stop))
     return [(lo + first, lo + last) for first, last in runs(places)]
-
-
-def _led_over(
-    clip: Clip, known: Observation, inner: tuple[int, int], worst: int, most: np.ndarray
-) -> tuple[Clip, tuple[int, int]]:
-    """The clip with a spline around the frame at which velocities jump worst, and over which frames: as few
-    of `inner` as bring the jumps below `most` (J,), or else those with which they are least."""
-    found = []
-    for seconds in MENDS:
-        half = max(1, round(seconds * clip.fps))
-        start, stop = max(inner[0], worst - half), min(inner[1], worst + half + 1)
-        free = np.zeros((len(clip), 1), bool)
-        free[start:stop] = True
-        if free.all():
-            break
-        done = Spline().complete(clip, Observation(known.rotation | ~free, known.translation | ~free)).clip
-        jump = share(done, known, np.arange(start - 1, stop + 1), most)
-        found.append((jump, done, (start, stop)))
-        if jump <= 1:
-            break
-    if not found:
-        return clip, (worst, worst + 1)
-    return min(found, key=lambda one: one[0])[1:]
 
 
 def soften(current: Clip, known: Observation, span: Span, limits: np.ndarray) -> float:

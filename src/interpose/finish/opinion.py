@@ -89,9 +89,9 @@ def second(
 ) -> Raw:
     """The fallback's completion; raises RequestError when it refuses, too."""
     for gap in gaps:
-        if reason := fallback.refuses(hidden, gap):
+        if reason := refusal(fallback, hidden, gap):
             raise RequestError(f"cannot fill {gap}", f"{fallback.name}: {reason}", "Choose another method.")
-    return fallback.complete(hidden, observation, seed)
+    return said(fallback, hidden, observation, seed)
 
 
 def _sound(raw: Any, clip: Clip, name: str) -> None:

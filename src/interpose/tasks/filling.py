@@ -10,7 +10,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, GapReport, Provenance, Report, complete, on_rig_of, seams
+from interpose.finish import Completion, GapReport, Provenance, Report, anatomy, complete, on_rig_of, seams
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
 from interpose.geometry.time import resample
@@ -92,7 +92,9 @@ def fill(
     spans(clip, observation, points)
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
     _check_open(jobs, points)
+    # Of all of the take: a window of it tells less of how it moves.
     limits = seams.limits(clip, observation) if any(job.method for job in jobs) else None
+    still = anatomy.still(clip, observation)
     work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
     for done, (group, chosen) in enumerate(work):
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
@@ -102,7 +104,7 @@ def fill(
         other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
         led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
         way = {frame - lo: point for frame, point in points.items() if frame in led}
-        part = complete(window, seen, chosen, seed, other, limits=limits, path=way, first=lo - zero)
+        part = complete(window, seen, chosen, seed, other, limits, still, path=way, first=lo - zero)
         whole.take(part, pieces, lo)
         if progress:
             progress((done + 1) / len(work))
