@@ -372,6 +372,19 @@ def test_only_the_rest_pose_is_said_to_be_it(walk):
     assert ["only the rest pose" in notes for notes in told] == [True, False]
 
 
+def test_in_a_brief_gap_feet_are_held_however_legs_jump_elsewhere(walk, speaking, monkeypatch):
+    """Where they jumped nowhere, say: in a longer one legs that would are left alone."""
+    slides = {}
+    for patched in (False, True):
+        for length in (8, 20):
+            known = gaps_of(walk, (55, 55 + length))
+            (gap,) = complete(walk, known, speaking(walk, sigma=0.08)).report.gaps
+            slides[patched, length] = gap.foot_slide
+        monkeypatch.setattr(guarantees, "_usual", lambda clip, known, peak: np.full(len(peak), 1e-9))
+    assert slides[True, 8] == slides[False, 8]
+    assert slides[True, 20] > slides[False, 20]
+
+
 class Kicking(Linear):
     """The right leg turns by two radians from frame 105 on."""
 
