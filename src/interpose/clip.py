@@ -276,3 +276,11 @@ class Clip:
     def with_motion(self, rotation: np.ndarray, translation: np.ndarray) -> Clip:
         """The same clip with other motion; the file's layout stays for writing."""
         return replace(self, rotation=rotation, translation=translation)
+
+    def joined(self, clips: Sequence[Clip]) -> Clip:
+        """The motion of clips on this skeleton, one after another, with the file's layout of this one."""
+        rotation, translation = (
+            np.concatenate([getattr(clip, name) for clip in clips]) for name in ("rotation", "translation")
+        )
+        source = self.source and self.source.along([(clip.source, len(clip)) for clip in clips])
+        return replace(self, rotation=rotation, translation=translation, source=source)

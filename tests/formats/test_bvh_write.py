@@ -13,7 +13,6 @@ from interpose import formats
 from interpose.clip import Clip, Skeleton
 from interpose.errors import FileError, RequestError
 from interpose.geometry import rotations
-from interpose.observation.timeline import joined
 
 
 def motion_lines(path):
@@ -162,13 +161,13 @@ def test_cuts_and_joins_keep_their_text(data, cmu_walk, tmp_path):
     moved = cmu_walk.slice(20, 30)
     moved = moved.with_motion(moved.rotation, moved.translation + 1.0)
     parts = [cmu_walk.slice(100, 140), moved, cmu_walk.slice(0, 30)]
-    formats.save(joined(cmu_walk, parts), tmp_path / "joined.bvh")
+    formats.save(cmu_walk.joined(parts), tmp_path / "joined.bvh")
     lines = motion_lines(tmp_path / "joined.bvh")
     assert lines[:40] + lines[50:] == original[100:140] + original[:30]
     turns = [line.split(b" ")[3:] for line in (*lines[40:50], *original[20:30])]
     assert turns[:10] == turns[10:]
     np.testing.assert_allclose(formats.load(tmp_path / "joined.bvh").root[40:50], moved.root, atol=1e-5)
-    longer = joined(cmu_walk, [cmu_walk, formats.load(data / "cmu_walk.bvh")]).slice(200, 215)
+    longer = cmu_walk.joined([cmu_walk, formats.load(data / "cmu_walk.bvh")]).slice(200, 215)
     formats.save(longer, tmp_path / "both.bvh")
     assert motion_lines(tmp_path / "both.bvh")[:9] == original[200:]
     np.testing.assert_allclose(formats.load(tmp_path / "both.bvh").positions(), longer.positions(), atol=1e-4)

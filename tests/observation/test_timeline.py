@@ -6,15 +6,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.skeletons.rigs import under_root
+from tests.skeletons.rigs import six_channels
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats import load
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
-from interpose.observation.timeline import Placement, fit, lay
-from interpose.skeletons.carrier import carriers, hips_of
+from interpose.observation.timeline import Placement, lay
+from interpose.skeletons.fitting import fit
 from interpose.skeletons.humanoid import reflect
 
 
@@ -58,95 +58,6 @@ def test_every_frame_is_kept(cmu_walk, run, jump):
         # Joints turn as they did; heights go by the size of the body alone.
         assert np.allclose(fitted.rotation, clip.rotation)
         assert np.allclose(_piece(line, number).root[:, 1], scale * clip.root[:, 1], atol=1e-6)
-
-
-def test_bodies_of_other_size_stand_on_the_floor(cmu_walk, run):
-    fitted, scale = fit(run, cmu_walk)
-    assert 0.9 < scale < 1.1
-    toes = [cmu_walk.skeleton.index(name) for name in ("LeftToeBase", "RightToeBase")]
-    before, after = (clip.positions()[:, toes, 1].min() for clip in (run, fitted))
-    assert abs(before - after) < 0.02
-
-
-@pytest.mark.parametrize("goes", [False, True])
-@pytest.mark.parametrize("frames", [1, 60])
-def test_bodies_of_other_size_begin_over_the_same_floor_point(run, goes, frames):
-    """Also where hips hang from a root that stays at the origin; one that goes along begins there, too."""
-    run = under_root(run, goes)
-    far = Placement(0.0, (30.0, 0.0, 40.0)).of(run, carriers(run)).slice(0, frames)
-    skeleton = replace(run.skeleton, rest_translation=0.6 * run.skeleton.rest_translation)
-    fitted, scale = fit(far, replace(run, skeleton=skeleton))
-    before, after = (clip.positions() for clip in (far, fitted))
-    hips = hips_of(skeleton)
-    assert scale == pytest.approx(0.6)
-    assert np.allclose(after[0, hips, [0, 2]], before[0, hips, [0, 2]], atol=1e-9)
-    assert np.allclose(after[:, hips, 1], 0.6 * before[:, hips, 1], atol=1e-9)
-    assert np.allclose(after[: 1 if goes else None, 0], before[: 1 if goes else None, 0], atol=1e-9)
-    ways = [p[-1, hips, [0, 2]] - p[0, hips, [0, 2]] for p in (before, after)]
-    assert np.allclose(ways[1], 0.6 * ways[0], atol=1e-9)
-
-
-def _six_channels(clip: Clip) -> Clip:
-    """The clip with positions of every joint in every frame, as some programs write files."""
-    joints = tuple(range(len(clip.skeleton)))
-    return replace(clip, translation=clip.local_translation(), translated=joints, source=None)
-
-
-def _of_size(clip: Clip, size: float) -> Clip:
-    """A body so many times as large that moves alike."""
-    skeleton = replace(clip.skeleton, rest_translation=size * clip.skeleton.rest_translation)
-    return replace(clip, skeleton=skeleton, translation=size * clip.translation, source=None)
-
-
-@pytest.mark.parametrize("frames", [1, 60])
-def test_joints_with_positions_of_their_own_have_bones_too(cmu_walk, run, frames):
-    """Written with six channels on every joint, a smaller body stays one, and moves as with three."""
-    child = _of_size(cmu_walk, 0.6).slice(0, frames)
-    (plain, wanted), (made, scale) = fit(run, child), fit(_six_channels(run), _six_channels(child))
-    assert scale == wanted < 0.7
-    assert np.array_equal(made.rotation, run.rotation)
-    assert np.allclose(made.positions(), plain.positions(), atol=1e-9)
-    line = lay([_six_channels(run), _six_channels(child)])
-    bones = np.linalg.norm(line.clip.translation[:, 1:], axis=-1)
-    assert np.ptp(bones, axis=0).max() < 1e-9
-
-
-def test_joints_that_give_way_do_so_on_bones_of_another_length(cmu_walk):
-    joint = cmu_walk.skeleton.index("LeftLeg")
-    walk, child = _six_channels(cmu_walk), _six_channels(_of_size(cmu_walk, 0.5))
-    shaken = walk.translation.copy()
-    shaken[::2, joint] *= 1.04
-    made = fit(walk.with_motion(walk.rotation, shaken), child)[0]
-    assert np.allclose(made.translation[:, joint], 0.5 * shaken[:, joint], atol=1e-9)
-
-
-def test_joints_that_are_animated_keep_their_own_places(cmu_walk):
-    """What stretches far, or is nowhere at rest, and all that is of one body."""
-    joint = cmu_walk.skeleton.index("LeftHand")
-    walk, child = _six_channels(cmu_walk), _six_channels(_of_size(cmu_walk, 0.5))
-    moved = walk.translation.copy()
-    moved[:, joint] += np.linspace(0.0, 0.3, len(walk))[:, None]
-    stretched = walk.with_motion(walk.rotation, moved)
-    assert np.array_equal(fit(stretched, child)[0].translation[:, joint], moved[:, joint])
-    assert np.array_equal(fit(stretched, walk)[0].translation, moved)
-    # Nor do they say how the rig rests.
-    bones = walk.skeleton.rest_translation.copy()
-    bones[joint] = [0.0, -0.3, 0.1]
-    other = replace(stretched, skeleton=replace(walk.skeleton, rest_translation=bones))
-    assert np.array_equal(fit(other, stretched)[0].translation, moved)
-
-
-def test_short_bones_with_positions_of_their_own_point_nowhere(cmu_walk):
-    """Where one is a hair long, its direction is chance."""
-    walk = _six_channels(cmu_walk)
-    rigs = []
-    for way in (1e-4, -1e-4):
-        bones, places = walk.skeleton.rest_translation.copy(), walk.translation.copy()
-        bones[7], places[:, 7] = [way, 0.0, 0.0], [way, 0.0, 0.0]
-        rigs.append(
-            replace(walk, skeleton=replace(walk.skeleton, rest_translation=bones), translation=places)
-        )
-    assert np.array_equal(fit(*rigs)[0].translation, rigs[0].translation)
 
 
 def test_the_same_rig_under_another_namespace_is_the_same_rig(cmu_walk):
@@ -253,26 +164,6 @@ def test_another_frame_rate_is_resampled(cmu_walk):
     assert np.allclose(_piece(line, 1).rotation[:, 1:], cmu_walk.rotation[:, 1:])
 
 
-def test_joints_in_another_order_are_found(cmu_walk):
-    skeleton = cmu_walk.skeleton
-    # Legs after arms: parents still come before their children.
-    order = sorted(range(len(skeleton)), key=lambda j: ("Leg" in skeleton.names[j], j))
-    order = sorted(order, key=lambda j: len(skeleton.ancestors(j)))
-    other = Clip(
-        Skeleton(
-            tuple(skeleton.names[j] for j in order),
-            tuple(order.index(skeleton.parents[j]) if skeleton.parents[j] >= 0 else -1 for j in order),
-            skeleton.rest_translation[order],
-        ),
-        cmu_walk.rotation[:, order],
-        cmu_walk.translation,
-        cmu_walk.fps,
-    )
-    fitted, scale = fit(other, cmu_walk)
-    assert scale == 1
-    assert np.array_equal(fitted.rotation, cmu_walk.rotation)
-
-
 def test_a_loop_lays_its_beginning_at_the_end(cmu_walk):
     line = lay([cmu_walk], 20, loop=True)
     assert [laid.stop for laid in line.laid] == [209]
@@ -318,7 +209,7 @@ def test_other_skeletons_are_refused(cmu_walk):
     with pytest.raises(RequestError, match="LeftForeArm rests 90 degrees away"):
         lay([cmu_walk, other := replace(cmu_walk, skeleton=replace(skeleton, rest_translation=bones))])
     with pytest.raises(RequestError, match="LeftForeArm rests 90 degrees away"):
-        lay([_six_channels(cmu_walk), _six_channels(other)])
+        lay([six_channels(cmu_walk), six_channels(other)])
     with pytest.raises(RequestError, match="no frames"):
         lay([cmu_walk, cmu_walk.slice(0, 0)])
     moves = tuple(range(len(skeleton)))

@@ -13,7 +13,7 @@ Lines below a chain hang on its last joint.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from textwrap import indent
 
 import numpy as np
@@ -533,3 +533,9 @@ def under_root(clip: Clip, goes: bool, hips_rest: float = 0.9) -> Clip:
         places[:, joint] = rotations.rotate(back, placed[:, like] - places[:, 0])
         rotation[:, joint] = rotations.multiply(back, turned[:, like])
     return Clip(skeleton, rotation, places, clip.fps, (0, 1, TARGET), clip.name)
+
+
+def six_channels(clip: Clip) -> Clip:
+    """The clip with positions of every joint in every frame, as some programs write files."""
+    joints = tuple(range(len(clip.skeleton)))
+    return replace(clip, translation=clip.local_translation(), translated=joints, source=None)

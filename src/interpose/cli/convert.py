@@ -112,7 +112,7 @@ def _convert(
     from interpose.formats import save
     from interpose.geometry.time import resample, spread
     from interpose.observation.scan import repeats
-    from interpose.observation.timeline import other_rig
+    from interpose.skeletons.fitting import other_rig
 
     output = _written(output, to)
     clip, rig = reading.load_all([file, onto or file])

@@ -28,7 +28,6 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import broken, medians
-from interpose.observation.timeline import joined
 from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -75,7 +74,7 @@ def _seated(clip: Clip, done: Clip, sound: Observation, free: Observation) -> Cl
     """
     same = (done.rotation == clip.rotation).all(axis=(1, 2))
     same &= (done.translation == clip.translation).all(axis=(1, 2))
-    both = joined(clip, [clip, done])
+    both = clip.joined([clip, done])
     kept = same[:, None] | ~free.rotation
     known = np.concatenate([sound.rotation & sound.translation, kept])
     return seated(both, known, known).slice(len(clip), len(both))

@@ -20,9 +20,9 @@ from interpose.finish.windows import ramp, rounded, spread
 from interpose.geometry import rotations
 from interpose.methods.bodies import RESTS
 from interpose.observation import Observation
-from interpose.observation.timeline import fit, joined, other_rig
 from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping
 from interpose.skeletons.carrier import rooted
+from interpose.skeletons.fitting import fit, other_rig
 from interpose.skeletons.humanoid import SHORT
 from interpose.skeletons.targets import seated
 
@@ -122,7 +122,7 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     made = _laid(made, mine, points)
     # A root above the hips goes and turns along, and targets stay on feet and hands, if they do so in the
     # other clip.
-    whole = joined(like, [like, made])
+    whole = like.joined([like, made])
     known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
     whole = seated(rooted(whole, known, known, len(like)), known, known)
     done = whole.slice(len(like), len(whole))

@@ -13,8 +13,7 @@ from interpose.geometry import rotations
 from interpose.geometry.ground import UP
 from interpose.observation.observation import Observation, frame_number, joint_names
 from interpose.skeletons.carrier import hips_of
-
-SAME = np.radians(20.0)  # people of one rig differ by less in the directions of their bones
+from interpose.skeletons.fitting import SAME
 
 
 @dataclass(frozen=True)

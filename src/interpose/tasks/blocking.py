@@ -10,8 +10,9 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.observation.scan import strays
-from interpose.observation.timeline import Placement, bounded, fit, joined, plausible_length
+from interpose.observation.timeline import Placement, bounded, plausible_length
 from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.fitting import fit
 from interpose.tasks.keys import block
 from interpose.tasks.stitching import BESIDE
 
@@ -79,7 +80,7 @@ def blocked(
     off = end.positions()[0, hips] - beside.slice(moment, moment + 1).positions()[0, hips]
     on = Placement(shift=(float(off[0]), 0.0, float(off[2]))).of(beside.slice(moment + 1, until))
     parts = [before.slice(since, last), laid, on]
-    return Blocked(joined(laid, parts), [len(parts[0]) + key for key in sorted(poses)], said)
+    return Blocked(laid.joined(parts), [len(parts[0]) + key for key in sorted(poses)], said)
 
 
 def _goes_on(clip: Clip) -> bool:

@@ -14,7 +14,6 @@ from interpose.finish import Completion
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Pin
 from interpose.observation.observation import frame_number
-from interpose.observation.timeline import joined
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
@@ -104,4 +103,4 @@ def block(poses: Mapping[int, Clip]) -> Clip:
                 "Use poses of one character.",
             )
     held = np.repeat(sorted(poses), np.diff([*sorted(poses), max(poses) + 1]))
-    return joined(first, [poses[frame] for frame in held.tolist()])
+    return first.joined([poses[frame] for frame in held.tolist()])
