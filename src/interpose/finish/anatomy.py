@@ -252,7 +252,7 @@ def whirl(clip: Clip, known: Observation, start: int, stop: int, but: Collection
     return Whirl(joint, steps.start + row + 1, float(rate[steps][row, joint]), float(usual[joint]))
 
 
-def calm(current: Clip, known: Observation, span: Span) -> None:
+def unwhirl(current: Clip, known: Observation, span: Span) -> None:
     """Let a spline lead joints over frames of a span in which they whirl; not those that carry the body."""
     lo, hi, (start, stop) = span.around(len(current), round(MENDS[-1] * current.fps))
     led, seen = current.slice(lo, hi), known.slice(lo, hi)

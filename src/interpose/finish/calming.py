@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish.denoise import calm
+from interpose.finish.denoise import smoothed
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
@@ -39,7 +39,7 @@ def calmed(clip: Clip, known: Observation) -> Clip:
             usual = _trembles(turns, parts) if usual is None else usual
             if least >= usual >= much / STANDS_OUT:
                 continue  # as it does all along
-            smooth = calm(turns[start:stop, None], clip.fps, 1.0)[:, 0]
+            smooth = smoothed(turns[start:stop, None], clip.fps, 1.0)[:, 0]
             rotation[start:stop, joint] = rotations.normalize(smooth)
     return clip.with_motion(rotation, clip.translation)
 

@@ -278,7 +278,7 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     noise = strength * noise
     shaky = max(SHAKY, QUICK * (AROUND / clip.fps) ** 2)
     near = np.where(noise > shaky, FAR * noise, np.inf)
-    places = calm(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
+    places = smoothed(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
     done = solve(still, known, joints, places)
     unsteady = noise[feet.ends(skeleton)].max(initial=0.0)
     if unsteady <= UNSTEADY:
@@ -310,13 +310,13 @@ def _calm_turns(clip: Clip, moves: np.ndarray, strength: float) -> Clip:
         above = world[:, parent] if parent >= 0 else rotations.identity(len(own))
         if moves[joint]:
             signal = rotations.continuous((own if to_parent[joint] else turned)[:, [joint]])
-            still = rotations.normalize(calm(signal, clip.fps, strength)[:, 0])
+            still = rotations.normalize(smoothed(signal, clip.fps, strength)[:, 0])
             local[:, joint] = still if to_parent[joint] else rotations.relative(above, still)
         world[:, joint] = rotations.multiply(above, local[:, joint])
     return clip.with_motion(local, clip.translation)
 
 
-def calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
+def smoothed(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
     """Signals (F, n, d) smoothed as far as their noise, times `strength`, makes it worth while.
 
     Smoothers of growing stiffness (Whittaker 1923, second differences) are weighed at every frame by their
@@ -330,7 +330,7 @@ def calm(signals: np.ndarray, fps: float, strength: float) -> np.ndarray:
 
 
 def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
-    """One signal (F, d), weighed as in `calm`; its noise and `moment` (frames) are above zero."""
+    """One signal (F, d), weighed as in `smoothed`; its noise and `moment` (frames) are above zero."""
     count = len(signal)
     stages = np.stack([signal, *(_whittaker(signal, stiff) for stiff in STIFF)])
     # The eigenvalues of the penalty are nearly those of a free beam; 1 / (1 + ...) is what is let through.

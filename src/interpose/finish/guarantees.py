@@ -188,7 +188,7 @@ class _Work:
             _fade(current, source, self.hidden, self.firm, span)
             if not (layer and layer.pins):
                 # What is pinned would be put back there, and jump.
-                anatomy.calm(current, self.firm, span)
+                anatomy.unwhirl(current, self.firm, span)
                 _steady(current, self.known, self.firm, span)
                 self.mended[span.start, own] = jumps.mend(current, self.firm, span, self.bounds)
         for span in chosen:
