@@ -708,3 +708,24 @@ def test_of_a_gap_in_pieces_the_joint_nearest_to_its_limit_counts():
     ]
     (whole,) = windows.joined(pieces)
     assert (whole.start, whole.stop, whole.seam_after, whole.seam_limit) == (10, 80, 1.5, 1.6)
+
+
+def test_what_hangs_from_a_body_is_not_expected_to_be_off_by_more_and_more(cmu_walk):
+    """A forearm that is lost all along: its hand is never further away than twice its length."""
+    back = cmu_walk.take([*range(209), *range(207, -1, -1)])
+    long = back.joined([back, back])
+    done = tasks.fill(long, [Gap(0, len(long), ("LeftForeArm",))], "small")
+    off = np.linalg.norm(done.clip.positions() - long.positions(), axis=-1)
+    true = 100 * off[:, off.max(axis=0) > 1e-6].mean()
+    assert 0.5 * true < done.report.gaps[0].expected < 3 * true
+
+
+def test_why_no_network_fills_a_gap_is_said_of_what_is_no_humanoid(cmu_walk):
+    """Also where the gap is too short for one of the networks that might have."""
+    names = tuple(f"part{j}" for j in range(len(cmu_walk.skeleton)))
+    bones = np.random.default_rng(0).permutation(cmu_walk.skeleton.rest_translation)
+    skeleton = replace(cmu_walk.skeleton, names=names, rest_translation=bones)
+    strange = replace(cmu_walk, skeleton=skeleton, source=None)
+    (gap,) = tasks.fill(strange, [Gap(60, 90)]).report.gaps
+    assert gap.method == "spline"
+    assert any(note.startswith("not filled by base") for note in gap.notes)

@@ -296,6 +296,7 @@ def test_the_place_of_a_body_is_recovered_by_name_and_where_it_stands_still(run,
     suit.translation[:] = suit.translation[0]
     save(suit, Path("suit.bvh"))
     assert "recover suit.bvh --place" in run("recover", "suit.bvh").err
+    assert "recover suit.bvh --place" in run("scan", "suit.bvh").out
 
 
 def test_recover(run, take):

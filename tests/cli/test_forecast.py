@@ -37,6 +37,8 @@ def test_two_seconds_are_added(run, walk):
 def test_as_many_frames_as_asked_for(run, walk):
     assert run("forecast", "walk.bvh", "--frames", "7", "--method", "linear", "-o", "on.bvh").code == 0
     assert len(load(walk.with_name("on.bvh"))) == len(load(walk)) + 7
+    assert run("forecast", "walk.bvh", "--frames", "0.5s", "--method", "linear", "-o", "for.bvh").code == 0
+    assert len(load(walk.with_name("for.bvh"))) == len(load(walk)) + 15
 
 
 def test_nothing_is_replaced_unasked(run, walk):
@@ -50,7 +52,7 @@ def test_nothing_is_replaced_unasked(run, walk):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (("--frames", "0"), "cannot forecast 0 frames"),
+        (("--frames", "0"), "cannot generate 0 frames"),
         (("--frames", "100000000"), "are more than 10 minutes"),
         (("--samples", "0"), "cannot forecast 0 samples"),
         (("--samples", "3", "--method", "linear"), "it has one answer only"),

@@ -321,3 +321,10 @@ def _shaken_turns(clip: Clip, but: slice) -> Clip:
     noise = rotations.exp(rng.normal(0, np.radians(1), (*clip.rotation.shape[:2], 3)))
     noise[but.start - 1 : but.stop] = [1.0, 0.0, 0.0, 0.0]
     return clip.with_motion(rotations.multiply(clip.rotation, noise), clip.translation)
+
+
+def test_noise_of_the_place_alone_is_reported_as_it_is(cmu_walk):
+    """Though it is taken out first, and what is left of it is little."""
+    shift = np.random.default_rng(1).normal(0.0, 0.01, (len(cmu_walk), 1, 3))
+    noisy = cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation + shift)
+    assert interpose.denoise(noisy).report.noise.noise == pytest.approx(1.0, rel=0.2)

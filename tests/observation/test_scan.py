@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from interpose.clip import Clip, Skeleton
+from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.observation import Gap, Observation
 from interpose.observation.scan import Finding, scan, to_gaps
@@ -456,3 +457,10 @@ def test_single_spikes_are_no_trembling(cmu_walk):
         )
     kinds = [one.kind for one in scan(clip.with_motion(rotation, clip.translation)) if one.start > 60]
     assert set(kinds) == {"lost"}
+
+
+def test_what_jumps_where_frames_are_repeated_is_judged_without_these(data):
+    """Half of the frames twice: hands that shake are not lost in every other one of them."""
+    clip = load(data / "cmu_jump.bvh")
+    twice = clip.take(np.repeat(np.arange(1, len(clip), 2), 2))
+    assert {one.kind for one in scan(twice)} <= {"repeated"}

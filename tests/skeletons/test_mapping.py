@@ -71,6 +71,10 @@ def test_a_horse_is_no_humanoid(cmu_walk):
         ("LEFT_UPLEG", "LeftUpLeg"),
         ("character:Left_Up_Leg", "LeftUpLeg"),
         ("lThighBend", "LeftUpLeg"),
+        ("leftupleg", "LeftUpLeg"),
+        ("LEFTFOREARM", "LeftForeArm"),
+        ("LeftUpLeg_bind", "LeftUpLeg"),
+        ("LeftUpLeg_skin", "LeftUpLeg"),
     ],
 )
 def test_left_and_right_in_every_spelling(cmu_walk, own, said):

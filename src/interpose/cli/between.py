@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from interpose.cli.console import effort, progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, describe, split_names
-from interpose.cli.whole import Whole
+from interpose.cli.whole import Whole, frames_of
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -62,8 +62,8 @@ def between(
         keys: the frames of the file that are keys, separated by commas, counted from 0; or seconds, 1s,2.5s.
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
-        frames: how many frames to generate between --start and --target; auto, the default, proposes it (from
-            the last anchor on).
+        frames: how many frames, or seconds, to generate between --start and --target; auto, the default,
+            proposes it (from the last anchor on).
         anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
             repeated.
         action: what the motion is; `interpose models base` lists what there is. A word does little: another
@@ -151,12 +151,8 @@ def _blocked(
                 f"frame {odd} of {path} has nothing to do with the one beside: frame {number} is taken"
             )
         at.append(number)
-    if frames != "auto" and not (frames.isdecimal() and int(frames) > 0):
-        raise RequestError(
-            f"cannot generate {frames} frames", "it takes a number from 1 on, or auto", "Write --frames 45."
-        )
     met = {when: clip.slice(frame, frame + 1) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
-    count = None if frames == "auto" else int(frames)
+    count = None if frames == "auto" else frames_of(frames, clips[0].fps)
     done = blocked(clips[0], at[0], clips[1], at[1], met, count)
     files = {path: clip for (path, _), clip in zip(named, loaded)}
     read = [line for path, clip in files.items() for line in describe(path, clip)]

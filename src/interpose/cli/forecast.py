@@ -12,7 +12,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
-from interpose.cli.whole import Whole
+from interpose.cli.whole import Whole, frames_of
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def forecast(
     file: Path,
     /,
     *,
-    frames: Whole | None = None,
+    frames: str | None = None,
     samples: Whole = 1,
     seed: Whole | None = None,
     temperature: float = 1.0,
@@ -63,7 +63,7 @@ def forecast(
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
         more: further ones: each is done by itself.
-        frames: how many to add, at the clip's own rate; 2 seconds without it.
+        frames: how many to add, at the clip's own rate, or seconds: 3s; 2 seconds without it.
         samples: in how many ways it may go on, each in a file of its own; for methods that draw at random.
         seed: of what is drawn at random. One sample without it is the most likely one.
         temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
@@ -88,8 +88,9 @@ def forecast(
     clip = reading.load(file)
     for path in clips:
         Outputs(path, outputs.report, outputs.page).check(file, force)
+    count = None if frames is None else frames_of(frames, clip.fps)
     with progress(f"going on with {file.name}", samples * 100) as advance:
-        done = tasks.forecast(clip, frames, samples, method, seed, temperature, advance)
+        done = tasks.forecast(clip, count, samples, method, seed, temperature, advance)
     more = _more(done, clips, temperature)
     report = to_json("forecast", file, clips[0], clip, done, seed, {}, more)
     page = _page(done, outputs.clip.name) if outputs.page else ""

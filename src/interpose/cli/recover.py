@@ -6,7 +6,6 @@ from pathlib import Path
 from shlex import quote
 from typing import Annotated, Any
 
-import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.batch import each
@@ -73,8 +72,7 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
-    from interpose.observation.scan import NO_GAPS, scan
-    from interpose.skeletons.carrier import STILL
+    from interpose.observation.scan import NO_GAPS, scan, stays
 
     check_method(method, license)
     clip = reading.load(file)
@@ -93,7 +91,7 @@ def recover(
     others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
     if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
-        if len(clip) > 1 and float(np.ptp(clip.translation, axis=0).max()) < STILL:
+        if stays(clip):
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
         raise NothingError(
             f"there is nothing to recover in {file}",

@@ -33,7 +33,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         json: print JSON for other programs.
     """
     from interpose.finish.feet import legs
-    from interpose.observation.scan import scan, to_gaps
+    from interpose.observation.scan import scan, stays, to_gaps
     from interpose.skeletons.carrier import place_of
 
     clip = reading.load(file)
@@ -52,8 +52,10 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say_json({"input": str(file), **details(clip), "findings": findings})
         return
     say("\n".join(describe(file, clip)))
+    where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."
+    suit = [where] if stays(clip) and legs(clip.skeleton) else []
     if not found:
-        say("nothing looks missing")
+        say("\n".join(["nothing looks missing", *suit]))
         return
     say()
     dropped = [one for one in found if one.kind == "lost"]
@@ -107,6 +109,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")
     if [one for one in stands if one.joints != body]:
         say(f"interpose recover {quote(str(file))} leads over what else stands still.")
+    for line in suit:
+        say(line)
 
 
 def _with_below(clip: Clip, joints: tuple[str, ...]) -> list[str]:

@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from interpose.cli.console import names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
-from interpose.cli.whole import Whole
+from interpose.cli.whole import Whole, frames_of
 from interpose.errors import RequestError
 from interpose.formats.place import vectors_in_file
 from interpose.observation import Gap
@@ -93,7 +93,8 @@ def stitch(
     Args:
         files: FILE or FILE#START:STOP, frames START to STOP - 1 of it, or seconds (.bvh, .npz, .amc); without
             START from the first frame on, without STOP to the last one.
-        frames: how many frames to generate: one number, or one for each gap; auto chooses what is unhurried.
+        frames: how many frames to generate, or seconds: one number, or one for each gap; auto chooses what is
+            unhurried.
         align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
         loop: lead back to the beginning as well, so that the motion can be played round and round.
         trim: with --loop, keep the part of the clip that goes round best already, such as one stride of a
@@ -123,7 +124,7 @@ def stitch(
         outputs.check(piece.file, force)
     clips = [piece.clip for piece in pieces]
     with progress(f"stitching {len(clips)} clips", sum(map(len, clips))) as advance:
-        done = tasks.stitch(clips, _lengths(frames), align, loop, action, method, seed, advance)
+        done = tasks.stitch(clips, _lengths(frames, clips[0].fps), align, loop, action, method, seed, advance)
     report = to_json("stitch", first, outputs.clip, done.clip, done, seed, {}, _more(pieces, done))
     report["units"] = {**report["units"], **UNITS}
     notes = write(outputs, force, done.clip, done, report)
@@ -229,12 +230,12 @@ def _fitted(piece: Piece, first: Clip) -> Piece:
     )
 
 
-def _lengths(text: str) -> str | list[int] | int:
-    """auto, one number, or several separated by commas."""
-    said = text.split(",")
-    if text == "auto" or not all(one.strip().isdecimal() for one in said):
-        return text  # "auto", or what `stitch` refuses
-    return int(text) if len(said) == 1 else [int(one) for one in said]
+def _lengths(text: str, fps: float) -> str | list[int] | int:
+    """auto, one number of frames or seconds, or several separated by commas."""
+    if text == "auto":
+        return text
+    said = [frames_of(one, fps) for one in text.split(",")]
+    return said[0] if len(said) == 1 else said
 
 
 def _placed(placement: Placement, clip: Clip) -> dict[str, Any]:

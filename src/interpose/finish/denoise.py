@@ -27,7 +27,8 @@ from interpose.geometry.time import bending, runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Observation
-from interpose.observation.broken import broken, medians
+from interpose.observation.broken import medians
+from interpose.observation.scan import intact
 from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, placed
@@ -119,13 +120,12 @@ def denoised(
         )
     cut, part = clip.slice(start, stop), slice(start, stop)
     free = _free(cut, joints)
-    whole = broken(cut)
+    whole = intact(cut)
     seen = Observation(whole.rotation | ~free.rotation, whole.translation | ~free.translation)
     filled = cut if seen.complete else fill(cut, seen)
     noise = deviation(filled.positions())
     if strength > 0 and (shaken := _shaken(filled, free)):
         filled = steadied(filled, strength * shaken)
-        noise = deviation(filled.positions())
     done, parts = filled if strength > 0 else cut, _parts(filled, free)
     for one in parts:
         first, last = one.start, one.stop

@@ -33,12 +33,13 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
     fast anything moves there, and to AT_ENDS those at an end of the clip. The spline else, and where no
     weights are installed; then with the reason why no network fills a gap that would be its own.
     """
-    why, short, at_end = None, False, gap.start == 0 or gap.stop == len(clip)
+    lacking, refused, short = None, None, False
+    at_end = gap.start == 0 or gap.stop == len(clip)
     for name in KEYS if gap.joints is None and lone == 2 else NETWORKS:
         try:
             card = weights.find(name)
         except RequestError as error:
-            why = why or f"{error.what}: {error.fix}"
+            lacking = lacking or f"{error.what}: {error.fix}"
             continue
         network = registry.get(name)
         any_length = gap.joints is not None or lone == 2 or (at_end and name in AT_ENDS)
@@ -49,8 +50,8 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
         reason = network.refuses(clip, gap)
         if reason is None:
             return network, None
-        why = why or f"not filled by {name}: {reason}"
-    return registry.get("spline"), None if short else why
+        refused = refused or f"not filled by {name}: {reason}"
+    return registry.get("spline"), refused or (None if short else lacking)
 
 
 def choose_told(clip: Clip, gap: Gap, action: str) -> Method:

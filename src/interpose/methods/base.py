@@ -448,7 +448,8 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
     if whole:
         sure[begin + FIRM * (begin > 0) : end - FIRM * (end < frames)] = GUESSED
     astray, backwards = in_turn and end - begin > ASTRAY, begin == 0 and end < frames
-    errors = _Errors(done.expected, closed)
+    # A body whose hips are known gets nowhere: limbs that hang from it are off by no more and more.
+    errors = _Errors(done.expected, closed, not motion.known[begin:end, [0, -1]].all())
     while begin < end:
         first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
         if end - begin > sight:
@@ -492,12 +493,14 @@ class _Errors:
 
     Attributes:
         expected: (F,) metres, of the whole motion.
+        adds: whether errors add up; else the larger one counts.
         carried: what the frames at both ends of what is left are expected to be off by themselves.
         told: whether all of it has been told.
     """
 
     expected: np.ndarray
     closed: bool
+    adds: bool
     carried: list[float] = field(default_factory=lambda: [0.0, 0.0])
     told: bool = False
 
@@ -509,5 +512,6 @@ class _Errors:
         self.told = all_left
         near, far = self.carried if all_left and self.closed else [self.carried[backwards]] * 2
         wearing = np.linspace(near, far, over.stop - over.start)
-        self.expected[over] = said[over.start - first : over.stop - first] + wearing
+        own = said[over.start - first : over.stop - first]
+        self.expected[over] = own + wearing if self.adds else np.maximum(own, wearing)
         self.carried[backwards] = float(self.expected[over][0 if backwards else -1])

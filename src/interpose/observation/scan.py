@@ -19,6 +19,7 @@ from interpose.observation.splined import splined
 from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation, restless
 from interpose.skeletons import SIDES, find_mapping
+from interpose.skeletons.carrier import STILL as UNMOVED
 from interpose.skeletons.carrier import hips_of, place_of, placed
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
@@ -214,6 +215,23 @@ def repeats(clip: Clip) -> np.ndarray:
         for start, stop in _holds(turned[first : last - 1], moved[first : last - 1], clip.fps):
             again[first + start + 1 : first + stop + 1] = True
     return again
+
+
+def intact(clip: Clip) -> Observation:
+    """What is left of a clip without values that were lost for moments, as `broken`: where frames are
+    repeated, in steps that are none, by the others."""
+    again = repeats(clip)
+    if not again.any():
+        return broken(clip)
+    kept = ~again
+    seen = broken(replace(clip.take(kept), fps=clip.fps * float(kept.mean())))
+    at = np.cumsum(kept) - 1
+    return Observation(seen.rotation[at], seen.translation[at])
+
+
+def stays(clip: Clip) -> bool:
+    """Whether nothing ever leaves its place, as of suits that know no places."""
+    return len(clip) > 1 and float(np.ptp(clip.translation, axis=0).max()) < UNMOVED
 
 
 def to_gaps(findings: Iterable[Finding]) -> list[Gap]:
@@ -526,15 +544,15 @@ def _found(clip: Clip, findings: list[Finding]) -> np.ndarray:
 
 def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Values that drop out, but those that have been found already; joints that do so together are one."""
-    seen = broken(clip)
+    seen = intact(clip)
     # Joints that stand still for most of the clip have no data to be restored from, but for spikes.
     turned, _ = _steps(clip, Observation.full(clip))
-    lost = ~(seen.rotation & seen.translation) & ~_found(clip, findings)
+    gone = ~(seen.rotation & seen.translation) & ~_found(clip, findings)
     for joint in np.flatnonzero((turned > STILL).mean(axis=0) <= 0.5):
-        for start, stop in runs(lost[:, joint]):
-            lost[start:stop, joint] = stop - start <= AROUND
+        for start, stop in runs(gone[:, joint]):
+            gone[start:stop, joint] = stop - start <= AROUND
     together: dict[tuple[int, int], list[str]] = {}
-    for name, column in zip(clip.skeleton.names, lost.T):
+    for name, column in zip(clip.skeleton.names, gone.T):
         for run in runs(column):
             together.setdefault(run, []).append(name)
     return [Finding("lost", tuple(names), *run, "jumps away and back") for run, names in together.items()]

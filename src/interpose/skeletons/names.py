@@ -48,7 +48,10 @@ SIDED = {
 
 LEFT, RIGHT = {"left", "l", "lft", "lt"}, {"right", "r", "rgt", "rt"}
 # Words that say nothing about the body, and words of joints that hang from others and are none of the 22.
-_TOOLS = "mixamorig bip biped cc base def org j c m jnt joint bone jt skeleton character armature rig sk b"
+_TOOLS = (
+    "mixamorig bip biped cc base def org j c m jnt joint bone jt skeleton character armature rig sk b bind "
+    "skin"
+)
 _EXTRAS = (
     "twist roll ik end nub tip effector helper pole target ctrl fk sec adj eye jaw tongue brow lip cheek "
     "hair finger thumb index middle mid ring pinky little metacarpal metatarsal metatarsals palm carpal "
@@ -120,12 +123,9 @@ def _say(cut: list[str]) -> Said:
 
 
 def _glued(plain: str) -> tuple[int, str]:
-    """A side that is one letter glued to the word: lfemur, lthighbend, thighl."""
-    for letter, side in (("l", -1), ("r", 1)):
-        for rest in (
-            plain[1:] if plain.startswith(letter) else "",
-            plain[:-1] if plain.endswith(letter) else "",
-        ):
-            if MEANING.get(rest) in SIDED or rest == "hip":
+    """A side that is glued to the word, its first letter or all of it: lfemur, thighl, leftupleg."""
+    for glued, side in (("left", -1), ("right", 1), ("l", -1), ("r", 1)):
+        for rest in (plain.removeprefix(glued), plain.removesuffix(glued)):
+            if rest != plain and (MEANING.get(rest) in SIDED or rest == "hip"):
                 return side, rest
     return 0, plain

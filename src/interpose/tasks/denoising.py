@@ -15,9 +15,8 @@ from interpose.methods import registry
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
-from interpose.observation.broken import broken
 from interpose.observation.exchange import put_back
-from interpose.observation.scan import STUCK, Finding, scan
+from interpose.observation.scan import STUCK, Finding, intact, scan
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import seed_of
@@ -75,7 +74,7 @@ def denoise(
 
 def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
     """What is missing of a clip in frames start to stop - 1, as nothing moves there, and is no noise."""
-    lost = ~broken(clip).rotation
+    gone = ~intact(clip).rotation
     found = [one for one in scan(clip) if one.kind in ("frozen", *STUCK)]
     # What snaps to its rest pose, and stays there, is among what is broken, which is filled.
     return [
@@ -83,7 +82,7 @@ def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
         for one in found
         if one.start < stop
         and start < one.stop
-        and not lost[one.start : one.stop, _values(clip, one)[0]].any()
+        and not gone[one.start : one.stop, _values(clip, one)[0]].any()
     ]
 
 

@@ -14,9 +14,8 @@ from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
-from interpose.observation.broken import broken
 from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
-from interpose.observation.scan import strays, stuck
+from interpose.observation.scan import intact, strays, stuck
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 
@@ -32,7 +31,7 @@ def recover(
 ) -> Completion:
     """Recover joints whose local rotations are unknown, over the whole clip or over frames start to stop - 1.
 
-    Without `joints` what was lost is found (`observation.broken`): joints that snap to their rest pose or
+    Without `joints` what was lost is found (`scan.intact`): joints that snap to their rest pose or
     jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
     whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn, or that are
     held in place and turn while something else goes on.
@@ -96,7 +95,7 @@ def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completi
 
 def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
     """What is left of a clip without what was lost in frames start to stop - 1: what `recover` finds."""
-    seen, odd = broken(clip), strays(clip)
+    seen, odd = intact(clip), strays(clip)
     seen.rotation[odd], seen.translation[odd] = True, True
     for one in stuck(clip):
         held = [clip.skeleton.index(name) for name in one.joints or ()]
