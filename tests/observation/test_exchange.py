@@ -14,7 +14,7 @@ from interpose.clip import Clip, Skeleton
 from interpose.geometry import kinematics, rotations
 from interpose.observation import exchange
 from interpose.observation.exchange import Crossing, Exchange, Flip, exchanges, put_back
-from interpose.observation.scan import scan, to_gaps
+from interpose.observation.scan import OR, scan, to_gaps
 from interpose.skeletons import JOINTS, PARENTS, SIDES, find_humanoid
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")
@@ -146,7 +146,7 @@ def spells(clip, way, start, stop):
     for (joint,), sign in zip(sides, (1, -1)):
         rotation[:, joint] = rotations.about("X", sign * signs * way)
     held = clip.with_motion(rotation, np.repeat(clip.translation[:1], len(way), axis=0))
-    return [(one.start, one.stop) for one in exchange._spells(held, Exchange(0, 0, *sides))]
+    return [(one.start, one.stop) for one in exchange._cuts(held, Exchange(0, 0, *sides))[0]]
 
 
 @pytest.mark.parametrize(("turn", "found"), [(0.5, False), (0.7, True)])
@@ -190,6 +190,24 @@ def test_what_changes_sides_for_good_is_left(cmu_walk):
     clip = cmu_walk.slice(1, 209)
     for start in range(10, 200, 10):
         assert exchanges(swapped(clip, LEG, (start, len(clip)))) == []
+
+
+@pytest.mark.parametrize("limb", [LEG, ARM])
+def test_what_changes_sides_for_good_is_put_back_where_somebody_says_that_it_is_wrong(data, limb):
+    """From a frame on to the end, up to one from the beginning, or for longer than anybody could tell."""
+    walk = formats.load(data / "cmu_walk.bvh").slice(1, 209)
+    clip = walk.take([*range(208), *range(206, -1, -1)])
+    for start, stop in ((150, 415), (0, 150), (100, 310)):
+        odd = swapped(clip, limb, (start, stop))
+        if not (told := [one for one in scan(odd) if one.kind == "exchanged"]):
+            continue  # they hang alike there
+        edges = {start, stop} - {0, 415}
+        assert {told[0].start, told[0].stop} - {415} == edges
+        assert OR in told[0].note
+        assert not [one for one in scan(odd) if one.kind == "jump"]
+        done = interpose.recover(odd, frames=(start, stop))
+        assert np.array_equal(done.clip.rotation, clip.rotation)
+        assert done.report.exchanged
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
-    from interpose.observation.scan import NO_GAPS, scan, stays
+    from interpose.observation.scan import NO_GAPS, OR, scan, stays
 
     check_method(method, license)
     clip = reading.load(file)
@@ -91,6 +91,9 @@ def recover(
     others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
     if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
+        if either := [one for one in scan(clip) if OR in one.note]:
+            part = f"{either[0].start}:{either[0].stop}"
+            fix = f"Limbs change sides at frame {either[0].start}: --frames {part} puts them back there."
         if stays(clip):
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
         raise NothingError(

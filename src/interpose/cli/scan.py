@@ -33,7 +33,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         json: print JSON for other programs.
     """
     from interpose.finish.feet import legs
-    from interpose.observation.scan import scan, stays, to_gaps
+    from interpose.observation.scan import OR, scan, stays, to_gaps
     from interpose.skeletons.carrier import place_of
 
     clip = reading.load(file)
@@ -80,8 +80,15 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose fill {quote(str(file))} {gap} fills anew what is splined first.")
     if dropped:
         say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
-    if any(one.kind in ("exchanged", "flipped") for one in found):
+    sides = [one for one in found if one.kind in ("exchanged", "flipped")]
+    if any(OR not in one.note for one in sides):
         say(f"interpose recover {quote(str(file))} puts limbs back.")
+    for one in sides:
+        if OR in one.note:
+            others = [f"0:{one.start}", *([f"{one.stop}:{len(clip)}"] if one.stop < len(clip) else [])]
+            part = f"interpose recover {quote(str(file))} --frames {one.start}:{one.stop}"
+            there = f"--frames {', then '.join(others)}"
+            say(f"{part} puts limbs back there; if they are wrong elsewhere, {there}.")
     if any(one.kind == "noisy" for one in found):
         say(f"interpose denoise {quote(str(file))} smooths what trembles.")
     if any(one.kind == "repeated" for one in found):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import numpy as np
 
@@ -44,7 +44,8 @@ class Exchange:
     # In 235 clips of all data sets, 366,000 frames, no share is below .83, of arms or legs. Where legs pass
     # each other at a radian a frame, exchanges end with shares of up to .8: .35 at both ends finds 35 of 48
     # exchanges of legs in a run and a dance, these find all 48.
-    sure, likely = 0.5, 0.8
+    sure: ClassVar[float] = 0.5
+    likely: ClassVar[float] = 0.8
     kind = "exchanged"
     note = "left and right are taken for each other"
 
@@ -69,7 +70,8 @@ class Crossing(Exchange):
 
     # Of 150 clips, 54,000 frames, none has one. Lines of an .amc file that were exchanged, which is another
     # thing, have shares of .5 at both ends, and what is one .03.
-    sure, likely = 0.35, 0.45
+    sure: ClassVar[float] = 0.35
+    likely: ClassVar[float] = 0.45
 
     def undone(self, clip: Clip) -> np.ndarray:
         """The rotations of a clip (F, J, 4) with both on the other side."""
@@ -97,7 +99,8 @@ class Flip:
     alone = ()
 
     # In 215 clips of all data sets two knees have two ends below this, which are flipped.
-    sure = likely = 0.35
+    sure: ClassVar[float] = 0.35
+    likely: ClassVar[float] = 0.35
     kind = "flipped"
     note = "half a turn about itself"
 
@@ -128,29 +131,57 @@ def exchanges(clip: Clip) -> list[Exchange | Flip]:
     """Where arms, or legs, change sides and back, or are flipped, in order of time; none of what is no
     humanoid."""
     mapping, found = find_mapping(clip.skeleton), list[Exchange | Flip]()
+    for sides in _sides(clip):
+        spells: list[Exchange] = [_whole(clip, one) for one in _cuts(clip, sides)[0]]
+        if not spells and (crossing := _crossing(clip, sides)) is not None:
+            spells += _cuts(clip, crossing)[0]
+        found += spells
     for limb in LIMBS:
         own = [mapping.joints[row] for row in limb]
-        pairs = [(joint, mapping.joints[SIDES[row]]) for joint, row in zip(own, limb)]
-        both = [(a, b) for a, b in pairs if a is not None and b is not None]
-        if JOINTS[limb[0]].startswith("Left") and both:
-            sides = [_whole(clip, one) for one in _spells(clip, Exchange(0, 0, *zip(*both)))]
-            if not sides and mapping.usable:
-                sides = _crossings(clip, Exchange(0, 0, *zip(*both)))
-            found += sides
         # Of an arm it is the collar that comes first.
         bones = own[:3] if JOINTS[limb[0]].endswith("UpLeg") else own[1:]
         if None not in bones and _chain(clip, bones):  # type: ignore[arg-type]
-            found += _spells(clip, Flip(0, 0, tuple(bones)))  # type: ignore[arg-type]
+            found += _cuts(clip, Flip(0, 0, tuple(bones)))[0]  # type: ignore[arg-type]
     return sorted(found, key=lambda one: (one.start, one.joints))
 
 
-def _crossings(clip: Clip, sides: Exchange) -> list[Exchange]:
-    """Where what was exchanged is where joints point; none where axes are alike, and it would be the same."""
+def crossovers(clip: Clip) -> list[Exchange]:
+    """Where arms, or legs, change sides and not back within LONGEST, in order of time: from there to the next
+    such place, or the end. Whether they are on the wrong side there, or in all other frames, nothing tells.
+    """
+    found = []
+    for sides in _sides(clip):
+        cuts = [*_cuts(clip, sides)[1], len(clip)]
+        if len(cuts) == 1 and (crossing := _crossing(clip, sides)) is not None:
+            sides, cuts = crossing, [*_cuts(clip, crossing)[1], len(clip)]
+        found += [
+            _whole(clip, replace(sides, start=start, stop=stop))
+            for start, stop in zip(cuts[:-1:2], cuts[1::2])
+        ]
+    return sorted(found, key=lambda one: (one.start, one.joints))
+
+
+def _sides(clip: Clip) -> list[Exchange]:
+    """The arms, and the legs, that might be taken for each other."""
+    mapping, found = find_mapping(clip.skeleton), []
+    for limb in LIMBS:
+        pairs = [(mapping.joints[row], mapping.joints[SIDES[row]]) for row in limb]
+        both = [(a, b) for a, b in pairs if a is not None and b is not None]
+        if JOINTS[limb[0]].startswith("Left") and both:
+            found.append(Exchange(0, 0, *zip(*both)))
+    return found
+
+
+def _crossing(clip: Clip, sides: Exchange) -> Crossing | None:
+    """The same as where joints point; None of no humanoid, and where axes are alike, and it would be the
+    same."""
+    if not find_mapping(clip.skeleton).usable:
+        return None
     crossing = Crossing(0, 0, sides.left, sides.right, body=find_humanoid(clip))
     few = clip.slice(0, 2)
     one, other = (kind.undone(few) for kind in (sides, crossing))
     alike = rotations.angle(one, other).max(initial=0.0) < ALIKE
-    return [] if alike else [*_spells(clip, crossing)]
+    return None if alike else crossing
 
 
 def put_back(clip: Clip, found: Sequence[Exchange | Flip]) -> Clip:
@@ -183,7 +214,7 @@ def _whole(clip: Clip, one: Exchange) -> Exchange:
     theirs = tuple(like[joint] for joint in mine)
     turning = np.ptp(rotations.continuous(clip.rotation), axis=0).max(axis=-1) > LIFELESS
     alone = sorted(joint for joint in (left | right) - {*mine, *theirs} if turning[joint])
-    ends = np.array([one.start, one.stop])
+    ends = np.array([end for end in (one.start, one.stop) if end < len(clip)])
     before, after = clip.rotation[ends - 1][:, mine + theirs], clip.rotation[ends]
     stay, change = (rotations.angle(before, after[:, to]).sum() for to in (mine + theirs, theirs + mine))
     if stay < change:
@@ -191,8 +222,9 @@ def _whole(clip: Clip, one: Exchange) -> Exchange:
     return replace(one, left=one.left + mine, right=one.right + theirs, alone=tuple(alone))
 
 
-def _spells(clip: Clip, kind: Kind) -> list[Kind]:
-    """The frames in which something was taken for something else: between two at which it begins and ends."""
+def _cuts(clip: Clip, kind: Kind) -> tuple[list[Kind], list[int]]:
+    """The frames in which something was taken for something else, between two at which it begins and ends;
+    and other frames at which it surely does the one or the other."""
     joints, own = list(kind.joints), clip.rotation
     other = kind.undone(clip)
 
@@ -200,12 +232,13 @@ def _spells(clip: Clip, kind: Kind) -> list[Kind]:
         return np.asarray(rotations.angle(before[:-1, joints], after[1:, joints]).sum(axis=1))
 
     stay, change = turn(own, own), turn(own, other)
-    sure = (stay > TURN) & (change < kind.sure * stay)
+    sure: np.ndarray = (stay > TURN) & (change < kind.sure * stay)
     if not sure.any():
-        return []
+        return [], []
     cuts = np.flatnonzero(sure | ((stay > LEAST) & (change < kind.likely * stay)))
     ends = _pairs(cuts, (stay - change)[cuts], sure[cuts], round(LONGEST * clip.fps))
-    return [replace(kind, start=start + 1, stop=stop + 1) for start, stop in ends]
+    lone = {*(np.flatnonzero(sure) + 1).tolist()} - {end + 1 for pair in ends for end in pair}
+    return [replace(kind, start=start + 1, stop=stop + 1) for start, stop in ends], sorted(lone)
 
 
 def _pairs(cuts: np.ndarray, spared: np.ndarray, sure: np.ndarray, longest: int) -> list[tuple[int, int]]:

@@ -13,7 +13,7 @@ from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.broken import AROUND, broken
-from interpose.observation.exchange import exchanges, put_back
+from interpose.observation.exchange import crossovers, exchanges, put_back
 from interpose.observation.observation import Gap, Observation
 from interpose.observation.splined import splined
 from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held_place
@@ -45,6 +45,7 @@ OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
 # decimals stand still for long.
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
+OR = "or in all other frames"  # where limbs change sides once, nobody knows which side of it is wrong
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
 REPEATS, OFTEN = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
@@ -123,6 +124,8 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
       is, for up to three), or spikes of up to three frames: what `recover` restores.
     - "exchanged": arms, or legs, that have each other's turns for a while, hands and fingers with them where
       they do: `recover` puts them back.
+      Where they do not change back within three seconds it may be in all other frames, and `recover` is told
+      which (`frames`).
     - "flipped": a thigh and its shin, or an arm, that are turned by half a turn about the line between their
       ends for a while, so that the knee bends backwards: `recover` turns them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
@@ -162,6 +165,12 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
         for one in swapped
     ]
     clip = put_back(clip, swapped)
+    either = crossovers(clip)
+    findings += [
+        Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, f"{one.note}, {OR}")
+        for one in either
+    ]
+    clip = put_back(clip, either)
     stiff = _stiff(clip, findings)
     findings = _but_whole(findings, stiff) + stiff
     repeated, brief = _repeated(turned, moved, first, clip.fps), round(HOLDS * clip.fps)

@@ -14,7 +14,7 @@ from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
-from interpose.observation.exchange import Exchange, Flip, exchanges, put_back
+from interpose.observation.exchange import Exchange, Flip, crossovers, exchanges, put_back
 from interpose.observation.scan import intact, strays, stuck
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
@@ -73,8 +73,17 @@ def recover(
 
 
 def swaps(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
-    """What was taken for something else within the frames start to stop - 1."""
-    return [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+    """What was taken for something else within the frames start to stop - 1; or in all of them, as somebody
+    says of a part of the clip at whose end, or beginning, limbs change sides."""
+    within = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+    if (start, stop) == (0, len(clip)):
+        return within
+    told = []
+    for one in crossovers(put_back(clip, within)):
+        for first, last in ((one.start, one.stop), (0, one.start), (one.stop, len(clip))):
+            if (start, stop) == (first, last):
+                told.append(replace(one, start=first, stop=last))
+    return sorted([*within, *told], key=lambda one: (one.start, one.joints))
 
 
 def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
