@@ -729,3 +729,20 @@ def test_why_no_network_fills_a_gap_is_said_of_what_is_no_humanoid(cmu_walk):
     (gap,) = tasks.fill(strange, [Gap(60, 90)]).report.gaps
     assert gap.method == "spline"
     assert any(note.startswith("not filled by base") for note in gap.notes)
+
+
+def test_another_body_in_the_same_file_is_said_to_be_interpolated(cmu_walk):
+    skeleton, count = cmu_walk.skeleton, len(cmu_walk.skeleton)
+    both = Skeleton(
+        (*skeleton.names, *(f"B_{name}" for name in skeleton.names)),
+        (*skeleton.parents, *(parent + count if parent >= 0 else -1 for parent in skeleton.parents)),
+        np.tile(skeleton.rest_translation, (2, 1)),
+    )
+    places = np.concatenate([cmu_walk.translation, cmu_walk.translation + np.array([2.0, 0, 0])], axis=1)
+    duo = Clip(both, np.tile(cmu_walk.rotation, (1, 2, 1)), places, cmu_walk.fps)
+    (gap,) = tasks.fill(duo, [Gap(60, 90)], "small").report.gaps
+    assert (
+        gap.notes[0] == "the 31 joints of B_Hips are another body, and interpolated: --root B_Hips fills it"
+    )
+    (gap,) = tasks.fill(cmu_walk, [Gap(60, 90)], "small").report.gaps
+    assert not any("another body" in note for note in gap.notes)

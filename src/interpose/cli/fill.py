@@ -148,7 +148,7 @@ def fill(
         return _dry_run(file, clip, request, points, pins, most, outputs, json, force, gaps)
     for read in (file, *(one.file for one in request.parts)):
         outputs.check(read, force, gaps)
-    missing = sum(map(len, request.gaps))
+    missing = len({frame for gap in request.gaps for frame in range(gap.start, gap.stop)})
     work = effort(missing, clip.fps) + len(clip) // 10
     with progress(f"filling {missing} frames of {file.name}", work) as advance:
         done = tasks.fill(

@@ -71,6 +71,7 @@ def gap_report(
             *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),
             *notes.sized(skeleton),
+            *(notes.others(skeleton, gap) if networks and own else ()),
             *notes.sunk(finished, known, gap, first),
             *notes.dull(alive, gap, first, ahead, span.method),
             *notes.adrift(glide, finished, gap),

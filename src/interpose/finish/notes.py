@@ -52,6 +52,7 @@ DRIFTS = 0.08
 # Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
 ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
+BODY = 10  # joints: what hangs together and has fewer is a prop
 
 
 def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
@@ -84,6 +85,22 @@ def sized(skeleton: Skeleton) -> list[str]:
     if not np.isfinite(leg) or LEGS[0] <= leg <= LEGS[1]:
         return []
     return [f"flagged: its legs are {leg:.3g} m long: is the unit right?"]
+
+
+def others(skeleton: Skeleton, gap: Gap) -> list[str]:
+    """Notes where a gap is one of more bodies than the one that networks fill."""
+    mapping = find_mapping(skeleton)
+    if not mapping.usable or gap.joints is not None:
+        return []
+    mine = {skeleton.ancestors(joint)[-1] for joint in mapping.mapped[1] if skeleton.ancestors(joint)}
+    said = []
+    for root in (root for root in skeleton.roots if root not in mine):
+        count = int(skeleton.below[:, root].sum())
+        if count >= BODY:
+            name = skeleton.names[root]
+            what = f"the {count} joints of {name} are another body, and interpolated"
+            said.append(f"{what}: --root {name} fills it")
+    return said
 
 
 def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
