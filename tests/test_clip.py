@@ -140,11 +140,15 @@ def test_slices_and_new_motion():
 
     whole = clip(5, source=Layout(), name="take")
     part = whole.slice(1, 3)
-    assert (len(part), part.source, part.name) == (2, slice(1, 3), "take")
+    assert (len(part), part.source.tolist(), part.name) == (2, [1, 2], "take")
     other = whole.with_motion(whole.rotation, whole.translation + 1)
     assert other.source is whole.source
     assert [4, 0] == whole.take([4, 0]).source.tolist() == whole.take(np.array([4, 0])).source.tolist()
     assert [2] == whole.take(np.arange(5) == 2).source.tolist() == whole.take([-3]).source.tolist()
+    assert len(whole.take([])) == len(whole.take((0, 4))) - 2 == 0
+    for wrong in ([5], 2, [0.5], [[1]]):
+        with pytest.raises(RequestError, match="there are no frames"):
+            whole.take(wrong)
     assert (whole.translation == 0).all()
     assert whole.seconds == pytest.approx(5 / 30)
 

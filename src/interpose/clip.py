@@ -23,7 +23,7 @@ class Source(Protocol):
     """What a file has and a clip does not: its layout, and the text of its numbers. It goes along with a clip
     that is cut, or joined with others, for writing."""
 
-    def take(self, frames: slice | np.ndarray) -> Source:
+    def take(self, frames: np.ndarray) -> Source:
         """Of some of the clip's frames, in that order; -1 is none of them."""
 
     def along(self, parts: Sequence[tuple[Source | None, int]]) -> Source:
@@ -266,12 +266,24 @@ class Clip:
         return self.take(slice(start, stop))
 
     def take(self, frames: Frames) -> Clip:
-        """Some frames, in any order; the file's layout stays for writing, and the text of their numbers."""
-        index = frames if isinstance(frames, slice) else np.arange(len(self))[frames]
+        """Some frames, in any order; the file's layout stays for writing, and the text of their numbers.
+
+        Raises RequestError for frames that there are not.
+        """
+        chosen = frames if isinstance(frames, slice) else np.asarray(frames)
+        if isinstance(chosen, np.ndarray) and not chosen.size:
+            chosen = np.zeros(0, int)
+        try:
+            index = np.arange(len(self))[chosen]
+        except IndexError:
+            index = np.zeros((0, 0), int)
+        if index.ndim != 1:
+            why = f"the clip has {len(self)} frames, counted from 0"
+            raise RequestError(f"there are no frames {frames}", why, "Choose some of them: [0, 3, 4].")
         source = self.source.take(index) if self.source is not None else None
-        return replace(
-            self, rotation=self.rotation[index], translation=self.translation[index], source=source
-        )
+        # Of a slice both are views.
+        part = chosen if isinstance(chosen, slice) else index
+        return replace(self, rotation=self.rotation[part], translation=self.translation[part], source=source)
 
     def with_motion(self, rotation: np.ndarray, translation: np.ndarray) -> Clip:
         """The same clip with other motion; the file's layout stays for writing."""

@@ -227,6 +227,19 @@ def test_what_never_turns_nearby_and_does_elsewhere_turns_in_a_gap(cmu_walk):
     assert np.ptp(done.rotation[INSIDE, neck], axis=0).max() > 0.1
 
 
+def test_what_never_turns_is_not_at_rest_where_nothing_of_it_is_known(cmu_walk):
+    """In the middle of a gap that is longer than what is looked at once: there a method says it."""
+    toe = cmu_walk.skeleton.index("LeftToeBase")
+    long = cmu_walk.take([*range(209), *range(207, -1, -1)])
+    long = long.joined([long, long, long, long])
+    long.rotation[:, toe] = rotations.exp(np.array([0.6, 0.0, 0.0]))
+    still = anatomy.still(long, Observation.full(long))
+    assert still[toe]
+    window = Observation.from_gaps(long, [Gap(0, len(long), ("LeftToeBase",))])
+    assert not anatomy.locked(window, still).rotation[:, toe].any()
+    assert anatomy.locked(Observation.full(long), still).rotation[:, toe].all()
+
+
 def test_a_joint_of_which_nothing_else_is_known_keeps_the_motion_that_a_method_gives_it(cmu_walk):
     """In less than two seconds a spline over all of it would be the rest pose, which does not whirl."""
     clip = cmu_walk.slice(40, 62)

@@ -97,6 +97,8 @@ def test_an_object_is_a_method_in_all_that_fills(cmu_walk):
     assert interpose.fill(cmu_walk, "40:60", method=mine).report.to_dict()["method"] == "mine"
     with pytest.raises(RequestError, match="cannot use a Half as a method\nit has no name and no refuses"):
         interpose.fill(cmu_walk, "40:60", method=type("Half", (), {"complete": None})())
+    with pytest.raises(RequestError, match=r"Give Mine\(\)"):
+        interpose.fill(cmu_walk, "40:60", method=Mine)
 
 
 def test_listing_methods_loads_no_network():

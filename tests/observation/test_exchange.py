@@ -285,3 +285,35 @@ def test_of_half_a_body_nothing_is_asked_that_takes_a_whole_one(cmu_walk, lost):
     half = Clip(part, cmu_walk.rotation[:, kept], cmu_walk.translation[:, :1], cmu_walk.fps)
     assert exchanges(half) == []
     tasks.denoise(half)
+
+
+def test_a_cut_of_half_a_stride_is_a_cut(cmu_walk):
+    """Legs are where the other ones were, and so is all else elsewhere."""
+    walk = cmu_walk.slice(1, 209)
+    for skipped in range(8, 40, 4):
+        cut = walk.take([*range(60), *range(60 + skipped, 208)])
+        assert not [one for one in scan(cut) if one.kind == "exchanged"]
+
+
+def test_what_else_is_wrong_is_found_beside_limbs_that_change_sides(cmu_walk):
+    odd = swapped(cmu_walk, LEG, (60, 209))
+    joint = odd.skeleton.index("RightLeg")
+    odd.rotation[150:170, joint] = odd.rotation[150, joint]
+    found = [(one.kind, one.joints) for one in scan(odd)]
+    assert [kind for kind, _ in found].count("exchanged") == 1
+    assert {joints for kind, joints in found if kind == "frozen"} == {("RightLeg",)}
+    assert not [kind for kind, _ in found if kind == "jump"]
+
+
+def test_what_changes_sides_three_times_is_put_back_part_by_part(cmu_walk):
+    walk = cmu_walk.slice(1, 209)
+    clip = walk.take([*range(208), *range(206, -1, -1), *range(1, 208)])
+    odd = swapped(clip, LEG, (100, 251), (402, 622))
+    told = [(one.start, one.stop) for one in scan(odd) if one.kind == "exchanged"]
+    assert told == [(100, 251), (402, 622)]
+    for parts in (told, [(0, 100), (251, 402)]):
+        done = odd
+        for part in parts:  # a frame or two are as good
+            done = interpose.recover(done, frames=(max(part[0] - 1, 0), part[1])).clip
+        wanted = clip if parts == told else swapped(clip, LEG, (0, 622))
+        assert np.array_equal(done.rotation, wanted.rotation)

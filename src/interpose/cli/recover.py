@@ -88,10 +88,11 @@ def recover(
     with progress(f"recovering {len(gap)} frames of {file.name}", work) as advance:
         done = tasks.recover(clip, chosen, (gap.start, gap.stop), method, seed, advance, place)
     looked = chosen is None and not place
-    others = [one for one in scan(done.clip) if one.kind not in NO_GAPS] if looked else []
+    seen = scan(done.clip) if looked else []
+    others = [one for one in seen if one.kind not in NO_GAPS]
     if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
-        if either := [one for one in scan(clip) if OR in one.note]:
+        if either := [one for one in seen if OR in one.note]:
             part = f"{either[0].start}:{either[0].stop}"
             fix = f"Limbs change sides at frame {either[0].start}: --frames {part} puts them back there."
         if stays(clip):

@@ -83,12 +83,18 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     sides = [one for one in found if one.kind in ("exchanged", "flipped")]
     if any(OR not in one.note for one in sides):
         say(f"interpose recover {quote(str(file))} puts limbs back.")
+    limbs: dict[object, list[int]] = {}
     for one in sides:
         if OR in one.note:
-            others = [f"0:{one.start}", *([f"{one.stop}:{len(clip)}"] if one.stop < len(clip) else [])]
-            part = f"interpose recover {quote(str(file))} --frames {one.start}:{one.stop}"
-            there = f"--frames {', then '.join(others)}"
-            say(f"{part} puts limbs back there; if they are wrong elsewhere, {there}.")
+            limbs.setdefault(one.joints and one.joints[0], []).extend((one.start, one.stop))
+    for cuts in limbs.values():
+        # Between changes of sides: every other stretch, or all others.
+        here, there = (
+            ", then ".join(f"{a}:{b}" for a, b in zip(some[::2], some[1::2]) if a < b)
+            for some in (cuts, [0, *cuts, len(clip)])
+        )
+        part = f"interpose recover {quote(str(file))} --frames {here}"
+        say(f"{part} puts limbs back there; if they are wrong elsewhere, --frames {there}.")
     if any(one.kind == "noisy" for one in found):
         say(f"interpose denoise {quote(str(file))} smooths what trembles.")
     if any(one.kind == "repeated" for one in found):

@@ -140,8 +140,8 @@ def still(clip: Clip, known: Observation) -> np.ndarray:
 
 
 def locked(known: Observation, still: np.ndarray) -> Observation:
-    """What is known, and that joints that are `still` (J,) stay as they are."""
-    return replace(known, rotation=known.rotation | still)
+    """What is known, and that joints that are `still` (J,) stay as they are, where anything of them is."""
+    return replace(known, rotation=known.rotation | (still & known.rotation.any(axis=0)))
 
 
 def unspun(opinion: Clip, known: Observation) -> Clip:

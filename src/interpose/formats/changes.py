@@ -33,11 +33,9 @@ class TextSource:
     skeleton: Skeleton
     at: np.ndarray
 
-    def take(self, frames: slice | np.ndarray) -> Self:
+    def take(self, frames: np.ndarray) -> Self:
         """As `Source.take`."""
-        if not isinstance(frames, slice):
-            return replace(self, at=np.append(self.at, -1)[np.minimum(frames, len(self.at))])
-        return replace(self, at=self.at[frames])
+        return replace(self, at=np.append(self.at, -1)[np.minimum(frames, len(self.at))])
 
     def along(self, parts: Sequence[tuple[Source | None, int]]) -> Self:
         """As `Source.along`."""

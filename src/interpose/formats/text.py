@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -104,13 +105,19 @@ class FrameText:
 
     def exchange(self, text: bytes, values: np.ndarray, fresh: np.ndarray, style: Style) -> bytes:
         """The text of a frame with the numbers of `values` (C,) where `fresh` (C,); all else stays."""
-        spans = [match.span(1) for match in WORD.finditer(text) if match[1]]
-        parts, done = [], 0
+        spans, done = _spans(text), 0
+        parts: list[bytes] = []
         for column, value in zip(self.columns[fresh].tolist(), values[fresh].tolist()):
             begin, end = spans[column]
             parts += [text[done:begin], style.text(value)]
             done = end
         return b"".join([*parts, text[done:]])
+
+
+@lru_cache(maxsize=2)
+def _spans(text: bytes) -> list[tuple[int, int]]:
+    """Where words begin and end. Frames that a file lacks are all written after the same one."""
+    return [match.span(1) for match in WORD.finditer(text) if match[1]]
 
 
 def words_of(text: bytes) -> list[bytes]:

@@ -51,6 +51,12 @@ def get(name: str | Method) -> Method:
     Raises RequestError for unknown names (with the list of known ones), for a method of another package that
     cannot be loaded, for a folder that is no model, and for an object that is no method.
     """
+    if isinstance(name, type):
+        raise RequestError(
+            f"cannot use {name.__name__} as a method",
+            "it is a class, and a method is an object",
+            f"Give {name.__name__}().",
+        )
     if not isinstance(name, str | PathLike):
         if lacking := _lacking(name):
             raise RequestError(

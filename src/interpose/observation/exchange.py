@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar, TypeVar
 
 import numpy as np
+from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.geometry import kinematics, rotations
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import JOINTS, PARENTS, SIDES, Humanoid, find_humanoid, find_mapping
+from interpose.skeletons.carrier import STILL
 from interpose.skeletons.mirror import counterparts
 
 # Seconds that it lasts at most: of longer ones nobody knows which part is the wrong one.
@@ -22,6 +24,9 @@ LONGEST = 3.0
 TURN = 0.6
 # The other end only spares something: they turn by more than this, and by less than the share `likely`.
 LEAST = 0.1
+# Where they change sides once, the rest of the body turns no further than so many times what it does within
+# three frames, and its place goes no further: else the motion was cut there, in the middle of a stride, say.
+CUT = 2.5
 # A joint that turns less than this in the whole clip (radians) has no data, and none on the wrong side.
 LIFELESS = 1e-3
 # Radians by which axes of the left and the right differ that are alike.
@@ -149,16 +154,31 @@ def crossovers(clip: Clip) -> list[Exchange]:
     """Where arms, or legs, change sides and not back within LONGEST, in order of time: from there to the next
     such place, or the end. Whether they are on the wrong side there, or in all other frames, nothing tells.
     """
-    found = []
-    for sides in _sides(clip):
+    found, every = [], _sides(clip)
+    cut = _torn(clip, every) if every else {*()}
+    for sides in every:
         cuts = [*_cuts(clip, sides)[1], len(clip)]
         if len(cuts) == 1 and (crossing := _crossing(clip, sides)) is not None:
             sides, cuts = crossing, [*_cuts(clip, crossing)[1], len(clip)]
+        cuts = [frame for frame in cuts if frame not in cut]
         found += [
             _whole(clip, replace(sides, start=start, stop=stop))
             for start, stop in zip(cuts[:-1:2], cuts[1::2])
         ]
     return sorted(found, key=lambda one: (one.start, one.joints))
+
+
+def _torn(clip: Clip, every: Sequence[Exchange]) -> set[int]:
+    """The frames to which all but limbs jumps, in how it turns or where it is."""
+    limbs = np.flatnonzero(clip.skeleton.below[:, [j for one in every for j in one.joints]].any(axis=1))
+    rest = [joint for joint in range(len(clip.skeleton)) if joint not in limbs]
+    turned = rotations.angle(clip.rotation[:-1, rest], clip.rotation[1:, rest]).sum(axis=1)
+    moved = np.linalg.norm(np.diff(clip.translation, axis=0), axis=-1).sum(axis=1)
+    torn = np.zeros(len(turned), bool)
+    for step, least in ((turned, LEAST), (moved, STILL)):
+        beside = ndimage.maximum_filter(step, footprint=[1, 1, 1, 0, 1, 1, 1], mode="nearest")
+        torn |= step > CUT * beside + least
+    return {*(np.flatnonzero(torn) + 1).tolist()}
 
 
 def _sides(clip: Clip) -> list[Exchange]:

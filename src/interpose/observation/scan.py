@@ -165,12 +165,18 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
         for one in swapped
     ]
     clip = put_back(clip, swapped)
-    either = crossovers(clip)
-    findings += [
+    either = [
         Finding(one.kind, tuple(names[j] for j in one.joints), one.start, one.stop, f"{one.note}, {OR}")
-        for one in either
+        for one in crossovers(clip)
     ]
-    clip = put_back(clip, either)
+    # They explain what jumps at their ends, and nothing in between.
+    ends = [
+        replace(one, start=end - 1, stop=end + 1)
+        for one in either
+        for end in (one.start, one.stop)
+        if end < len(clip)
+    ]
+    findings += ends
     stiff = _stiff(clip, findings)
     findings = _but_whole(findings, stiff) + stiff
     repeated, brief = _repeated(turned, moved, first, clip.fps), round(HOLDS * clip.fps)
@@ -191,7 +197,7 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
     if not repeated:
         findings += _jumps(clip, known, findings)
         findings += _noisy(clip, known, findings)
-    return findings
+    return [one for one in findings if one not in ends] + either
 
 
 def strays(clip: Clip) -> list[int]:

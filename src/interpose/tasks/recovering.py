@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +19,9 @@ from interpose.observation.scan import intact, strays, stuck
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 
+# Seconds by which somebody may miss the frame at which limbs change sides.
+NEAR = 0.1
+
 
 def recover(
     clip: Clip,
@@ -34,7 +37,9 @@ def recover(
     Without `joints` what was lost is found (`scan.intact`): joints that snap to their rest pose or
     jump away and back, and spikes, at any frames but a first or last one that is no part of the motion as a
     whole: that `scan` finds, and `fill` mends; and hips whose place stands still while they turn, or that are
-    held in place and turn while something else goes on.
+    held in place and turn while something else goes on. Arms and legs that change sides and not back are put
+    back in the frames from one such change to the next, or to an end of the clip, where `frames` names these:
+    `scan` does.
     `place` says that this is all that is lost: where the body is, but for the first frame of a whole clip.
     Feet that stand tell it. Other arguments, result and errors are those of `fill`.
     """
@@ -74,16 +79,26 @@ def recover(
 
 def swaps(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
     """What was taken for something else within the frames start to stop - 1; or in all of them, as somebody
-    says of a part of the clip at whose end, or beginning, limbs change sides."""
+    says of a part of the clip from one change of sides to the next, or to an end, which they meet to NEAR."""
     within = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
     if (start, stop) == (0, len(clip)):
         return within
-    told = []
-    for one in crossovers(put_back(clip, within)):
-        for first, last in ((one.start, one.stop), (0, one.start), (one.stop, len(clip))):
-            if (start, stop) == (first, last):
-                told.append(replace(one, start=first, stop=last))
+    told, near = [], max(1, round(NEAR * clip.fps))
+    for first, last, one in stretches(crossovers(put_back(clip, within)), len(clip)):
+        if abs(first - start) <= near and abs(last - stop) <= near:
+            told.append(replace(one, start=first, stop=last))
     return sorted([*within, *told], key=lambda one: (one.start, one.joints))
+
+
+def stretches(found: Sequence[Exchange], frames: int) -> Iterator[tuple[int, int, Exchange]]:
+    """From each change of sides to the next, or an end of the clip, of each limb that does: start, stop, and
+    what is exchanged there or in the stretches beside it."""
+    limbs: dict[int, list[Exchange]] = {}
+    for one in found:
+        limbs.setdefault(one.left[0], []).append(one)
+    for some in limbs.values():
+        cuts = sorted({0, frames, *(end for one in some for end in (one.start, one.stop))})
+        yield from ((first, last, some[0]) for first, last in zip(cuts, cuts[1:]))
 
 
 def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
