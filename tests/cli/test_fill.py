@@ -626,3 +626,26 @@ def test_weights_in_a_folder_are_told_by_their_own_card(run, take):
     done = run("fill", "take.bvh", "--gap", "60:90", "--method", "mine", "--license", "open", "--json")
     assert done.json["weights"] == [{"name": "small", "licence": card.licence, "commit": "1234567"}]
     assert "research" not in run("fill", "take.bvh", "--gap", "60:90", "--method", "mine", "--force").out
+
+
+def test_limbs_that_change_sides_for_good_are_put_back_as_scan_and_recover_say(run, take):
+    clip = load(take)
+    left, right = (
+        [clip.skeleton.index(side + part) for part in ("UpLeg", "Leg", "Foot", "ToeBase")]
+        for side in ("Left", "Right")
+    )
+    rotation = clip.rotation.copy()
+    rotation[90:, left + right] = clip.rotation[90:, right + left]
+    save(clip.with_motion(rotation, clip.translation), Path("odd.bvh"))
+    thumb = clip.skeleton.index("RThumb")
+    rotation[:, thumb] = rotation[0, thumb]
+    save(clip.with_motion(rotation, clip.translation), Path("walk.bvh"))
+    part = f"90:{len(clip)}"
+    said = run("scan", "odd.bvh").out
+    assert f"recover odd.bvh --frames {part} puts limbs back there" in said
+    assert "if they are wrong elsewhere, --frames 0:90." in said
+    # With something else to recover, a thumb, and without.
+    assert f"--frames {part} puts them back there" in run("recover", "odd.bvh", "--dry-run").out
+    assert f"--frames {part} puts them back there" in run("recover", "walk.bvh").err
+    assert run("recover", "odd.bvh", "--frames", part).code == 0
+    assert np.abs(load(Path("odd.recovered.bvh")).positions() - clip.positions()).max() < 1e-4

@@ -90,13 +90,15 @@ def recover(
     looked = chosen is None and not place
     seen = scan(done.clip) if looked else []
     others = [one for one in seen if one.kind not in NO_GAPS]
+    sides = ""
+    if either := [one for one in seen if OR in one.note]:
+        part = f"{either[0].start}:{either[0].stop}"
+        sides = f"Limbs change sides at frame {either[0].start}: --frames {part} puts them back there."
     if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
-        if either := [one for one in seen if OR in one.note]:
-            part = f"{either[0].start}:{either[0].stop}"
-            fix = f"Limbs change sides at frame {either[0].start}: --frames {part} puts them back there."
         if stays(clip):
             fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
+        fix = sides or fix
         raise NothingError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose, spikes, changes sides, or jumps away and back within moments",
@@ -112,6 +114,8 @@ def recover(
     code = finish(
         "recover", file, outputs, clip, done, seed, {}, json=json, force=force, more=more, dry_run=dry_run
     )
+    if sides and not json:
+        say(sides)
     if others and not json:
         rest = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
         say(f"Missing, too, and left as it is: {', '.join(lost[:SHOWN])}{rest}")
