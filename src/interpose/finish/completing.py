@@ -13,6 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.finish import feet, pins
+from interpose.finish.aiming import aimed, severed
 from interpose.finish.gap_report import same
 from interpose.finish.guarantees import STEPPED, STEPS, Ask, guaranteed
 from interpose.finish.loose import MOST, Layer, loose, without
@@ -82,6 +83,9 @@ def _complete(
         hanging = loose(hidden, certain(hidden, observation))
         if hanging.any():
             return _laid(hanging, clip, observation, ask)
+        parts = severed(hidden, certain(hidden, observation))
+        if parts.any():
+            return _aimed(parts, clip, observation, ask)
     return guaranteed(clip, hidden, observation, ask)
 
 
@@ -97,6 +101,15 @@ def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -
     simpler: Method = layer if hanging.any(axis=0).mean() < MOST else ask.fallback
     done = _complete(clip, observation, replace(ask, method=layer, fallback=simpler), None)
     return _told_of(body, done, (STEPS, STEPPED) if anew else ())
+
+
+def _aimed(parts: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
+    """Complete a clip without known `parts` (F, J) of legs whose thighs are lost, and aim these."""
+    body = _complete(clip, without(observation, parts), ask, None)
+    layer = Layer(
+        ask.method.name, aimed(body.clip, clip, parts), body.raw, np.zeros_like(parts), stands=False
+    )
+    return _told_of(body, _complete(clip, observation, replace(ask, method=layer), None))
 
 
 def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation, ask: Ask) -> Completion:
