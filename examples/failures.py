@@ -14,7 +14,7 @@ import argparse
 from pathlib import Path
 
 import interpose
-from interpose.finish.measures import joint_error
+from interpose.geometry.measures import joint_error
 from interpose.geometry.time import resample
 from interpose.show import Take, strip
 

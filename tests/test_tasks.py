@@ -15,10 +15,10 @@ import pytest
 from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
-from interpose.finish import complete, feet, measures
+from interpose.finish import complete, feet
 from interpose.finish.report import GapReport
 from interpose.formats import load
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.methods import registry, weights

@@ -10,9 +10,9 @@ from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.evaluation.denoising import UNIT, drop, shake, tremble
-from interpose.finish import Provenance, feet, measures
+from interpose.finish import Provenance, feet
 from interpose.finish.denoise import deviation
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.time import resample
 from interpose.observation.scan import scan
 from interpose.skeletons import find_mapping

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from interpose.clip import Clip
-from interpose.finish import complete, feet, guarantees, measures, notes
-from interpose.geometry import rotations
+from interpose.finish import complete, feet, guarantees, notes
+from interpose.geometry import measures, rotations
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 

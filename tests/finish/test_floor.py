@@ -9,9 +9,9 @@ import pytest
 from tests.skeletons.rigs import under_root
 
 from interpose import fill
-from interpose.finish import complete, feet, floor, measures
+from interpose.finish import complete, feet, floor
 from interpose.formats import load
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation

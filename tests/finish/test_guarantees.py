@@ -11,8 +11,8 @@ import pytest
 from interpose import formats
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Provenance, arms, complete, guarantees, measures, seams
-from interpose.geometry import rotations
+from interpose.finish import Provenance, arms, complete, guarantees, seams
+from interpose.geometry import measures, rotations
 from interpose.methods.classical import Linear, Spline, ZeroVelocity
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import interpose
-from interpose.finish import Provenance, measures
+from interpose.finish import Provenance
 from interpose.finish.path import follow
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 
 GAP, MIDDLE = (140, 190), 165
 

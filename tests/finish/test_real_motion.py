@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from interpose import formats, tasks
-from interpose.finish import feet, measures, seams
-from interpose.geometry import rotations
+from interpose.finish import feet, seams
+from interpose.geometry import measures, rotations
 from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping

@@ -9,9 +9,9 @@ import pytest
 
 from interpose import formats
 from interpose.clip import Clip
-from interpose.finish import complete, feet, guarantees, measures, shuffling
+from interpose.finish import complete, feet, guarantees, shuffling
 from interpose.finish.windows import ramp
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.time import resample
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation

@@ -9,8 +9,8 @@ import pytest
 
 from interpose import formats
 from interpose.clip import Clip
-from interpose.finish import complete, feet, guarantees, measures
-from interpose.geometry import rotations
+from interpose.finish import complete, feet, guarantees
+from interpose.geometry import measures, rotations
 from interpose.methods.classical import Linear
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import interpose
-from interpose.finish import measures
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.observation import Gap, Observation, Part
 from interpose.observation.part import lay
 

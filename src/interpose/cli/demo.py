@@ -116,7 +116,7 @@ def _show(clip: Clip, out: Path, name: str) -> None:
 
 def _row(name: str, clip: Clip, done: Completion, gap: Gap) -> list[str]:
     from interpose.cli.outputs import seam
-    from interpose.finish.measures import joint_error
+    from interpose.geometry.measures import joint_error
 
     inside = slice(gap.start, gap.stop)
     wrong = joint_error(done.clip.positions()[inside], clip.positions()[inside])

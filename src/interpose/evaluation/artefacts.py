@@ -16,7 +16,8 @@ import numpy as np
 
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import DATASETS, windows
-from interpose.finish import complete, feet, measures
+from interpose.finish import complete, feet
+from interpose.geometry import measures
 from interpose.geometry.time import runs
 from interpose.methods import registry
 from interpose.observation import Gap, Observation

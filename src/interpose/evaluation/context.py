@@ -21,8 +21,9 @@ import numpy as np
 from interpose.datasets.catalogue import FPS
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import DATASETS, Window, windows
-from interpose.finish import complete, measures
+from interpose.finish import complete
 from interpose.finish.notes import DULL
+from interpose.geometry import measures
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method
 from interpose.observation import Gap

@@ -18,8 +18,9 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import DATASETS, Window, windows
-from interpose.finish import complete, feet, measures
+from interpose.finish import complete, feet
 from interpose.finish.opinion import wipe
+from interpose.geometry import measures
 from interpose.methods import registry
 from interpose.methods.cae import Cae
 from interpose.methods.weights import Card

@@ -21,9 +21,9 @@ from interpose.clip import Clip, Skeleton
 from interpose.datasets import clips
 from interpose.errors import RequestError, unknown
 from interpose.evaluation.table import markdown
-from interpose.finish import complete, feet, measures, seams
+from interpose.finish import complete, feet, seams
 from interpose.finish.opinion import wipe
-from interpose.geometry import kinematics, rotations
+from interpose.geometry import kinematics, measures, rotations
 from interpose.methods import registry
 from interpose.methods.protocol import Actor, Method
 from interpose.observation import Gap, Observation

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.finish import feet, measures
+from interpose.finish import feet
 from interpose.finish.leading import led_over
+from interpose.geometry import measures
 from interpose.observation import Observation
 from interpose.skeletons import find_mapping
 

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.finish import measures
 from interpose.finish.swings import lifts
 from interpose.finish.windows import envelope, ramp, rounded, spread
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
 from interpose.skeletons import LEG_LENGTH, find_mapping

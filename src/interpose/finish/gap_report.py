@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, jumps, measures, notes, penetration
+from interpose.finish import feet, jumps, notes, penetration
 from interpose.finish.report import GapReport, Provenance
 from interpose.finish.span import Span
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping

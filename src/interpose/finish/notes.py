@@ -9,8 +9,9 @@ from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import few
-from interpose.finish import anatomy, feet, floor, jumps, measures, seams
+from interpose.finish import anatomy, feet, floor, jumps, seams
 from interpose.finish.windows import grow
+from interpose.geometry import measures
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid, find_mapping

@@ -13,11 +13,10 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import measures
 from interpose.finish.feet import Leg, ends, legs, reach
 from interpose.finish.floor import higher
 from interpose.finish.windows import ramp, rounded, spread
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.methods.bodies import RESTS
 from interpose.observation import Observation
 from interpose.skeletons import BONES, JOINTS, Humanoid, find_humanoid, find_mapping

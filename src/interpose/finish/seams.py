@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import measures
 from interpose.finish.solve import refine
+from interpose.geometry import measures
 from interpose.geometry.time import ease, runs
 from interpose.geometry.values import moved, offset
 from interpose.observation import Observation

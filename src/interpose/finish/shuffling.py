@@ -13,9 +13,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, measures
+from interpose.finish import feet
 from interpose.finish.stepping import LIFT, SINK, let_down, stands_upright
 from interpose.finish.windows import ramp
+from interpose.geometry import measures
 from interpose.geometry.time import runs
 from interpose.observation import Observation
 

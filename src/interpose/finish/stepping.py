@@ -20,9 +20,9 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip
-from interpose.finish import feet, measures
+from interpose.finish import feet
 from interpose.finish.windows import envelope, ramp, spread
-from interpose.geometry import rotations
+from interpose.geometry import measures, rotations
 from interpose.geometry.ground import FLOOR
 from interpose.geometry.time import ease
 from interpose.observation import Observation

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, on_rig_of, seams
-from interpose.finish.measures import acceleration
+from interpose.geometry.measures import acceleration
 from interpose.methods.protocol import Method
 from interpose.observation import Observation, gait, timeline
 from interpose.skeletons import find_humanoid
