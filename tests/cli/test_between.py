@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from interpose.formats import load, save
+from interpose.geometry import rotations
 
 
 def test_keys_come_back_and_the_rest_is_new(run, take):
@@ -33,6 +34,17 @@ def test_an_action_is_told_to_what_fills_best_and_is_replayed(run, take):
     assert again.code == 0
     first, second = (take.with_name(name).read_bytes() for name in ("take.between.bvh", "again.bvh"))
     assert first == second
+
+
+def test_a_joint_is_held_between_poses_of_several_files(run, take):
+    """As it is in the first one, which is frame 0."""
+    poses = ["between", "--start", "take.bvh#40", "--target", "take.bvh#60", "--frames", "20", "--pin"]
+    assert run(*poses, "LeftHand@1:8:@0").code == 0
+    hand = load(take).skeleton.index("LeftHand")
+    turned, placed = load(take.with_name("take.between.bvh")).kinematics()
+    assert np.abs(placed[1:8, hand] - placed[0, hand]).max() < 0.001
+    assert np.degrees(rotations.angle(turned[1:8, hand], turned[0, hand])).max() < 0.1
+    assert "is missing itself" in run(*poses, "LeftHand@1:8:@9", "--force").err
 
 
 def test_a_path_and_pins_between_keys_are_met_and_replayed(run, take):

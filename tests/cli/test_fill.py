@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from interpose.formats import load, save
+from interpose.geometry import rotations
 from interpose.methods import weights
 
 
@@ -515,8 +516,22 @@ def test_a_report_that_was_spoilt_is_refused(run, take, key, value):
     assert not take.with_name("again.bvh").exists()
 
 
+def test_a_joint_is_held_as_it_is_at_another_frame(run, take):
+    """In place and turn, where that frame is known."""
+    words = ["fill", "take.bvh", "--gap", "60:90", "--pin"]
+    done = run(*words, "LeftFoot@60:75:@59", "--json")
+    assert done.json["pinned"] == ["LeftFoot@60:75:@59"]
+    foot = load(take).skeleton.index("LeftFoot")
+    turned, placed = load(take.with_name("take.filled.bvh")).kinematics()
+    assert np.abs(placed[60:75, foot] - placed[59, foot]).max() < 0.001
+    assert np.degrees(rotations.angle(turned[60:75, foot], turned[59, foot])).max() < 0.1
+    assert "is missing itself" in run(*words, "LeftFoot@60:75:@75", "--force").err
+    assert "there is no frame" in run(*words, "LeftFoot@60:75:@999", "--force").err
+
+
 @pytest.mark.parametrize(
-    "text", ["LeftHand", "LeftHand@75", "LeftHand@75:1,2", "LeftHand@77:75:1,2,3", "75:1,2,3"]
+    "text",
+    ["LeftHand", "LeftHand@75", "LeftHand@75:1,2", "LeftHand@77:75:1,2,3", "75:1,2,3", "LeftHand@75:@1,2"],
 )
 def test_a_pin_that_cannot_be_read(run, take, text):
     done = run("fill", "take.bvh", "--gap", "60:90", "--pin", text)

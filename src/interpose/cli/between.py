@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -71,7 +72,8 @@ def between(
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit; --start is frame
             0. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
-            to hold it there. May be repeated.
+            to hold it there. @30 instead of X,Y,Z: where it is at frame 30, and turned as it is then. May be
+            repeated.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
@@ -82,6 +84,7 @@ def between(
     """
     from interpose import tasks
     from interpose.cli.request import check_method, frame_of, path_of, pins_of
+    from interpose.observation import Gap
 
     check_method(method, license)
     said, others, read = "", dict[Path, bool](), None
@@ -103,7 +106,10 @@ def between(
     cut = read is not None
     zero = chosen[0] if cut else 0
     points = {zero + frame: point for frame, point in path_of(path, clip).items()}
-    pins = [replace(one, frames=zero + one.frames) for one in pins_of(pin, clip)]
+    open_ = [Gap(a + 1 - zero, b - zero) for a, b in pairwise(sorted({*chosen})) if b > a + 1]
+    pins = [
+        replace(one, frames=zero + one.frames) for one in pins_of(pin, clip.slice(zero, len(clip)), open_)
+    ]
     what = f"generating what lies between {len(chosen)} keys of {file.name}"
     missing = max(chosen, default=0) - min(chosen, default=0)
     with progress(what, effort(missing, clip.fps)) as advance:

@@ -78,7 +78,7 @@ def compare(
         check_method(name, license)
     clip = reading.load(file)
     request = from_options(file, clip, gap, joints, gaps, reading)
-    asked, points, pins = request.gaps, path_of(request.path, clip), pins_of(request.pins, clip)
+    asked, points, pins = request.gaps, path_of(request.path, clip), pins_of(request.pins, clip, request.gaps)
     parts = [one.part for one in request.parts]
     page = output or file.with_name(f"{file.stem}.compared.html")
     _check(page, force)

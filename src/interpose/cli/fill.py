@@ -60,6 +60,7 @@ def fill(
       interpose fill take.bvh --gaps take.filled.json -o again.bvh   (once more)
       interpose fill take.bvh --gap 120:160 --path 140:35,-120
       interpose fill take.bvh --gap 120:160 --pin LeftHand@140:35,142,-20
+      interpose fill take.bvh --gap 120:160 --pin LeftHand@120:150:@119   (held)
       interpose fill take.bvh --gap 120:150 --from wave.bvh --from-range 40:48
         --at 130 --joints RightArm,RightHand   (with another clip's arm in it)
       interpose fill take.bvh --layer --from wave.bvh --at 130
@@ -83,7 +84,8 @@ def fill(
             is filled around them.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
-            to hold it there. May be repeated.
+            to hold it there. @119 instead of X,Y,Z: where it is at frame 119, and turned as it is then. May
+            be repeated.
         output: where to write the filled clip; the report goes beside it. Of several clips a folder.
         method: what fills the gaps: auto (the default), base, spline, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
@@ -130,7 +132,7 @@ def fill(
         )
     request = from_options(file, clip, gap, [] if parts and not layer else joints, gaps, reading)
     request = replace(request, parts=request.parts + parts, path=request.path + path, pins=request.pins + pin)
-    points, pins = path_of(request.path, clip), pins_of(request.pins, clip)
+    points, pins = path_of(request.path, clip), pins_of(request.pins, clip, request.gaps)
     check_method(method or "auto", license)
     if method is not None:
         request = replace(request, method=method, methods={})

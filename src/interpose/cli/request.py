@@ -15,7 +15,7 @@ from interpose.clip import Clip
 from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
 from interpose.formats.text import VALUE_LIMIT
-from interpose.observation import Gap, Part, Pin
+from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.gapfile import is_report, read_gaps, read_json
 from interpose.observation.observation import frame_at
 from interpose.observation.scan import NO_GAPS, STUCK, scan, to_gaps
@@ -272,14 +272,19 @@ def _until(text: str, clip: Clip) -> int:
     return len(clip) if text == str(len(clip)) else frame_of(text, clip)
 
 
-def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
-    """Pins "JOINT@FRAME:X,Y,Z" or "JOINT@START:STOP:X,Y,Z" of --pin, in the file's own unit and axes."""
+def pins_of(texts: list[str], clip: Clip, gaps: list[Gap]) -> list[Pin]:
+    """Pins "JOINT@FRAME:X,Y,Z" or "JOINT@START:STOP:X,Y,Z" of --pin, in the file's own unit and axes; or with
+    "@FRAME" for the place, which is known in spite of the gaps: there, and turned as it is then."""
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
     found = []
     for text in texts:
-        match = re.fullmatch(rf"(.+)@({FRAME})(?::({FRAME}))?:([^:,]+),([^:,]+),([^:,]+)", text)
+        match = re.fullmatch(
+            rf"(.+)@({FRAME})(?::({FRAME}))?:(?:@({FRAME})|([^:,]+),([^:,]+),([^:,]+))", text
+        )
         try:
-            where = np.array([float(number) for number in match.groups()[3:]] if match else [np.nan])
+            where = np.array(
+                [float(number) for number in match.groups()[4:]] if match and not match[4] else 0
+            )
         except ValueError:
             where = np.array([np.nan])
         start = frame_of(match[2], clip) if match else 0
@@ -288,13 +293,32 @@ def pins_of(texts: list[str], clip: Clip) -> list[Pin]:
             raise RequestError(
                 f"cannot read --pin {text}",
                 "a pin is a joint, a frame or a range, and three coordinates in the file's own unit and axes",
-                "Write for example --pin LeftHand@130:35,142,-20, or LeftHand@130:140:35,142,-20 to hold it.",
+                "Write for example --pin LeftHand@130:35,142,-20, LeftHand@130:140:35,142,-20 to hold it, or "
+                "LeftHand@130:140:@129 to hold it as it is at frame 129.",
             )
         (joint,) = full_names([match[1]], clip)
         clip.skeleton.index(joint)
         frames = np.arange(start, stop)
-        found.append(Pin(joint, frames, np.tile(vectors_inside(where, unit, up), (len(frames), 1))))
+        if match[4]:
+            place, turn = _held(text, joint, frame_of(match[4], clip), clip, gaps)
+        else:
+            place, turn = vectors_inside(where, unit, up), None
+        rows = None if turn is None else np.tile(turn, (len(frames), 1))
+        found.append(Pin(joint, frames, np.tile(place, (len(frames), 1)), rows))
     return found
+
+
+def _held(text: str, name: str, frame: int, clip: Clip, gaps: list[Gap]) -> tuple[np.ndarray, np.ndarray]:
+    """Where a joint is at a frame, in metres, and how it is turned; RequestError where gaps hide it."""
+    known, joint = Observation.from_gaps(clip, gaps), clip.skeleton.index(name)
+    if not (known.positions(clip.skeleton) & known.rotation)[frame, joint]:
+        raise RequestError(
+            f"cannot use --pin {text}",
+            f"where {name} is at frame {frame} is missing itself",
+            "Name a frame outside of the gaps.",
+        )
+    turned, placed = clip.slice(frame, frame + 1).kinematics()
+    return placed[0, joint], turned[0, joint]
 
 
 def parts_to_dict(parts: list[Lent]) -> list[dict[str, Any]]:
