@@ -259,6 +259,19 @@ def test_a_real_walk_has_no_frozen_body(cmu_walk):
     assert found == []
 
 
+@pytest.mark.parametrize("step", [0.5, 1.0])
+def test_angles_that_were_rounded_are_not_frozen(cmu_walk, step):
+    """To half a degree, or a whole one: joints stand still between its steps. One that is away is found."""
+    walk = cmu_walk.slice(1, len(cmu_walk))
+    angles = np.round(np.degrees(rotations.to_euler(walk.rotation, "ZYX")) / step) * step
+    coarse = walk.with_motion(rotations.from_euler(np.radians(angles), "ZYX"), walk.translation)
+    assert [one for one in scan(coarse) if one.kind != "noisy"] == []
+    rotation, arm = coarse.rotation.copy(), coarse.skeleton.index("LeftForeArm")
+    rotation[60:90, arm] = rotation[20, arm]
+    found = scan(coarse.with_motion(rotation, coarse.translation))
+    assert ("frozen", ("LeftForeArm",), 60, 90) in spans(found)
+
+
 @pytest.mark.parametrize("way", [0.4, 1.5])
 def test_a_body_that_is_elsewhere_from_one_frame_on_is_said_to_jump(cmu_walk, way):
     clip = cmu_walk.slice(1, 200)

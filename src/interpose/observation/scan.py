@@ -3,8 +3,9 @@ drop out."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy import ndimage
@@ -40,6 +41,11 @@ SHORTEST = 0.1
 SHORTEST_WITHOUT_JUMP = 1.0
 # The least jump, in radians and metres.
 JUMP_TURN, JUMP_WAY = 0.01, 0.02
+# Where angles are rounded a quick joint stands still for a step or two again and again, and a slow one turns
+# for as long: at least so many times, and in so large a share of its pauses, or of its turns. So many
+# times what it turns by, in a quarter of its steps at most, is no jump: all three of its angles may take that
+# step at once.
+PAUSES, BRIEFLY, ROUNDED = 4, 0.5, 2.0
 # The mean turn of the joints into a frame that is out of place: radians.
 OUTLIER = 0.05
 # What a joint usually moves in the time of a run without a jump, at least: slow joints of files with few
@@ -47,7 +53,7 @@ OUTLIER = 0.05
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 OR = "or in all other frames"  # where limbs change sides once, nobody knows which side of it is wrong
 # Runs of so many equal frames are repeated ones where that happens in such a share of all frames.
-REPEATS, OFTEN = 3, 0.04
+REPEATS, REPEATING = 3, 0.04
 HOLDS, MOSTLY = 0.3, 0.5  # or runs of so many seconds, in such a share: motion that was animated in steps
 # Metres a second, in the mean over joints, at which a body moves before and after a frame that is doubled.
 MOVES = 0.2
@@ -333,6 +339,20 @@ class _Steps:
         """How many steps a frozen run has, at least."""
         return _shortest(self.clip.fps)
 
+    @cached_property
+    def rounded(self) -> np.ndarray:
+        """(J,) radians by which joints turn that are rounded; 0 for all others."""
+        found = np.zeros(self.still.shape[1])
+        for joint, still in enumerate(self.still.T):
+            brief = ([stop - start < self.shortest for start, stop in runs(part)] for part in (still, ~still))
+            if any(sum(few) >= max(PAUSES, BRIEFLY * len(few)) for few in brief):
+                found[joint] = np.nanpercentile(self.turned[~still, joint], 25)
+        return found
+
+    def jump(self, joints: Sequence[int] | np.ndarray) -> float:
+        """Radians that the turns of joints are more than, if one jumps."""
+        return max(JUMP_TURN, ROUNDED * float(np.median(self.rounded[joints]))) if len(joints) else JUMP_TURN
+
     def finding(self, kind: str, joints: tuple[str, ...] | None, run: Run, why: str = "") -> Finding:
         """What a run says."""
         # Steps start..stop - 1 are zero, so frames start..stop are equal. One of them is good, unless both
@@ -379,7 +399,7 @@ def _frozen_poses(steps: _Steps, whole: np.ndarray, alive: np.ndarray) -> tuple[
     """Runs of steps (n,) in which the `whole` pose stands still, and the steps (n,) of those in which it does
     so to be measured."""
     clip, found, stands = steps.clip, list[Finding](), np.zeros(len(whole), bool)
-    for run in _runs(whole, steps.turned[:, alive].max(axis=1), JUMP_TURN):
+    for run in _runs(whole, steps.turned[:, alive].max(axis=1), steps.jump(alive)):
         if run.stop - run.start < steps.shortest:
             continue
         begin, end = steps.first + run.start, steps.first + run.stop
@@ -405,17 +425,18 @@ def _frozen_joints(steps: _Steps, whole: np.ndarray, alive: np.ndarray) -> list[
     together: dict[Run, list[int]] = {}
     pauses: dict[tuple[int, int], list[int]] = {}
     turnless = still[:, lively].all(axis=1) & ~whole & (len(lively) >= MANY)
-    for run in _runs(turnless, turned[:, lively].max(axis=1, initial=0.0), JUMP_TURN):
+    for run in _runs(turnless, turned[:, lively].max(axis=1, initial=0.0), steps.jump(lively)):
         if run.stop - run.start >= steps.shortest:
             together[run] = lively
         else:
             turnless[run.start : run.stop] = False
     for joint in lively:
         own = turned[:, joint]
-        for run in _runs(still[:, joint] & ~whole & ~turnless, own, JUMP_TURN):
+        for run in _runs(still[:, joint] & ~whole & ~turnless, own, steps.jump([joint])):
             value = clip.rotation[steps.first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
-            if _suspicious(run, clip.fps, np.nanmean(own) / EXPECTED_TURN * (not at_limit)):
+            told = not at_limit and not steps.rounded[joint]
+            if _suspicious(run, clip.fps, np.nanmean(own) / EXPECTED_TURN * told):
                 together.setdefault(run, []).append(joint)
             elif run.stop - run.start >= steps.shortest:
                 pauses.setdefault((run.start, run.stop), []).append(joint)
@@ -624,7 +645,7 @@ def _repeated(turned: np.ndarray, moved: np.ndarray, first: int, fps: float) -> 
 def _holds(turned: np.ndarray, moved: np.ndarray, fps: float) -> list[tuple[int, int]]:
     """Runs of steps in which nothing moves, again and again; none where that is the exception."""
     same = _still(turned, moved)
-    for longest, often in ((REPEATS, OFTEN), (round(HOLDS * fps), MOSTLY)):
+    for longest, often in ((REPEATS, REPEATING), (round(HOLDS * fps), MOSTLY)):
         brief = [run for run in runs(same) if run[1] - run[0] <= longest]
         inside = [run for run in brief if run[0] > 0 and run[1] < len(same)]
         again = sum(stop - start for start, stop in inside)
