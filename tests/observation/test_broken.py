@@ -40,6 +40,22 @@ def test_a_spike_is_found(cmu_walk):
     assert np.argwhere(lost).tolist() == [[100, arm], [101, arm]]
 
 
+@pytest.mark.parametrize("lost", [slice(0, 1), slice(0, 3), slice(-1, None), slice(-2, None)])
+@pytest.mark.parametrize("name", ["LeftArm", "RightUpLeg"])
+def test_a_spike_at_an_end_is_found(cmu_walk, lost, name):
+    """Though it does not come back from it, or leave it; a pose in which all joints are elsewhere is none."""
+    walk = cmu_walk.slice(1, 200)
+    rotation, joint = walk.rotation.copy(), walk.skeleton.index(name)
+    rotation[lost, joint] = rotations.multiply(rotation[lost, joint], rotations.about("X", np.array(1.0)))
+    seen = broken(walk.with_motion(rotation, walk.translation))
+    expected = np.ones_like(seen.rotation)
+    expected[lost, joint] = False
+    np.testing.assert_array_equal(seen.rotation, expected)
+    rotation = walk.rotation.copy()
+    rotation[lost] = walk.rotation[100]
+    assert broken(walk.with_motion(rotation, walk.translation)).complete
+
+
 @pytest.mark.parametrize("frames", [1, 2, 3])
 @pytest.mark.parametrize("axis", [0, 1, 2])
 @pytest.mark.parametrize("name", ["Hips", "LeftArm"])

@@ -54,6 +54,8 @@ SLOPE = 0.25
 # 1 m aside for up to 1.5 s in clips of all sets all are found so; where they come back to, within a second,
 # tells of 36.
 LEAP, BACK = 4.0, 0.5
+# At the ends of a clip there is one side to tell by: a spike there is so many times as far.
+ONE_SIDED = 1.5
 # A spike of a joint is real if what it moves of the joints below comes nearer to its median without it, by
 # this share of the way beyond the first metres. Noise on positions turns short bones by any angle, and what
 # hangs below them is where it should be.
@@ -157,7 +159,35 @@ def _lost(
             middle = np.where(twice[:, None], led, middle)
             spikes[good, column] |= twice
             usual[:, column] = middle[near]
+    # Where many are elsewhere at an end the pose is another one, and none of them lost by itself.
+    ends, others = (
+        np.array([_ends(values[:, column], least) for column in range(values.shape[1])]).T
+        for least in (ONE_SIDED * far, far / MANY)
+    )
+    ends &= (others.sum(axis=1, keepdims=True) < MANY) & ~(snaps | away)
+    for column in np.flatnonzero(ends.any(axis=0)).tolist():
+        good = np.flatnonzero(~ends[:, column])
+        nearest = np.arange(len(values)).clip(good[0], good[-1])
+        usual[ends[:, column], column] = values[nearest[ends[:, column]], column]
+    spikes |= ends
     return snaps, away, spikes, usual
+
+
+def _ends(values: np.ndarray, far: float) -> np.ndarray:
+    """(F,) the first and the last frames, up to three, of values (F, d) that leap right after, or before."""
+    lost = np.zeros(len(values), bool)
+    if len(values) > 4 * AROUND:
+        own = _continuous(values) * 2.0 if values.shape[1] == 4 else values
+        for forward in (1, -1):
+            # What it goes on with: four steps after the three that may leap.
+            steps = np.diff(own[::forward][: 2 * AROUND + 2], axis=0)
+            off = np.linalg.norm(steps - np.median(steps[AROUND:], axis=0), axis=-1)
+            for frames in range(AROUND, 0, -1):
+                others = np.delete(off, frames - 1)[: frames + 2]
+                if off[frames - 1] > max(far, LEAP * others.max()):
+                    lost[::forward][:frames] = True
+                    break
+    return lost
 
 
 def _exchanged(clip: Clip, away: np.ndarray) -> np.ndarray:

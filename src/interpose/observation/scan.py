@@ -591,7 +591,11 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     for name, column in zip(clip.skeleton.names, gone.T):
         for run in runs(column):
             together.setdefault(run, []).append(name)
-    return [Finding("lost", tuple(names), *run, "jumps away and back") for run, names in together.items()]
+    found = []
+    for (start, stop), names in together.items():
+        at_end = "comes from elsewhere" * (start == 0) or "jumps away" * (stop == len(clip))
+        found.append(Finding("lost", tuple(names), start, stop, at_end or "jumps away and back"))
+    return found
 
 
 def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
