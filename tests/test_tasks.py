@@ -349,18 +349,21 @@ def test_half_an_hour_takes_less_than_a_gigabyte(data):
 
 
 @pytest.mark.parametrize(
-    ("slides", "glides", "travels", "longer"),
+    ("slides", "glides", "travels", "flags", "longer"),
     [
-        ((20.0, 11.0), (0.0, 0.15), (1.0, 1.0), True),
-        ((20.0, 11.0), (0.0, 0.22), (1.0, 1.0), False),
-        ((20.0, 11.0), (0.0, None), (1.0, 0.3), True),
-        ((20.0, 11.0), (0.0, None), (1.0, 0.1), False),
+        ((20.0, 11.0), (0.0, 0.15), (1.0, 1.0), (0, 0), True),
+        ((20.0, 11.0), (0.0, 0.22), (1.0, 1.0), (0, 0), False),
+        ((20.0, 11.0), (0.0, None), (1.0, 0.3), (0, 0), True),
+        ((20.0, 11.0), (0.0, None), (1.0, 0.1), (0, 0), False),
+        ((20.0, 11.0), (0.0, 0.15), (1.0, 1.0), (0, 1), False),
+        ((20.0, 99.0), (0.0, 0.15), (1.0, 1.0), (1, 0), True),
     ],
 )
 def test_a_transition_takes_longer_where_feet_slide_less(
-    cmu_walk, data, monkeypatch, slides, glides, travels, longer
+    cmu_walk, data, monkeypatch, slides, glides, travels, flags, longer
 ):
-    """Gliding all along counts as 50 cm/s; feet that do not travel tell nothing."""
+    """Gliding all along counts as 50 cm/s; feet that do not travel tell nothing; and first of all
+    it is one in which nothing is flagged."""
     line = timeline.lay([cmu_walk, load(data / "cmu_run.bvh")])
     (gap,), tried = line.gaps, []
 
@@ -368,7 +371,8 @@ def test_a_transition_takes_longer_where_feet_slide_less(
         which = min(len(tried), 1)
         tried.append(len(gaps[0]))
         said = replace(GapReport(0, 9, None, "made up"), foot_slide=slides[which])
-        said = replace(said, gliding=glides[which], foot_travel=travels[which])
+        notes = ("flagged: made up",) * flags[which]
+        said = replace(said, gliding=glides[which], foot_travel=travels[which], notes=notes)
         return SimpleNamespace(report=SimpleNamespace(gaps=[said]))
 
     monkeypatch.setattr(stitching, "fill", judged)
@@ -376,6 +380,22 @@ def test_a_transition_takes_longer_where_feet_slide_less(
     assert tried[0] == len(gap)
     assert tried[-1] <= len(gap) + cmu_walk.fps
     assert (length > len(gap)) == longer
+
+
+def test_a_transition_is_shorter_where_something_is_flagged_in_all_others(cmu_walk, data, monkeypatch):
+    """By a tenth of a second each time, until nothing is."""
+    line = timeline.lay([cmu_walk, load(data / "cmu_run.bvh")])
+    (gap,) = line.gaps
+
+    def judged(clip, gaps, *args, **more):  # type: ignore[no-untyped-def]
+        flagged = ("flagged: made up",) if len(gaps[0]) > len(gap) - 6 else ()
+        said = replace(GapReport(0, 9, None, "made up"), foot_slide=9.0, foot_travel=1.0, notes=flagged)
+        return SimpleNamespace(report=SimpleNamespace(gaps=[said]))
+
+    monkeypatch.setattr(stitching, "fill", judged)
+    (length,), (why,) = stitching._tried(line, "auto", "", None)
+    assert length == len(gap) - 6
+    assert "of 13 lengths tried" in why
 
 
 @pytest.mark.parametrize(("pace", "goes_on"), [(15.0, True), (25.0, False)])

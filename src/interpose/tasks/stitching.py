@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, on_rig_of, seams
+from interpose.finish.report import GapReport
 from interpose.geometry.measures import acceleration
 from interpose.methods.protocol import Method
 from interpose.observation import Observation, gait, timeline
@@ -15,11 +16,13 @@ from interpose.skeletons import find_humanoid
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
-# Seconds by which a transition may be longer than it has to be, where feet slide less so; seconds of motion
-# on either side with which that is tried; metres that feet have to travel in it; and the slide (cm/s) that
-# counts as much as gliding all along.
-TRIED, BESIDE, TRAVELS, GLIDING = 1.0, 0.7, 0.2, 50.0
-BRIDGE = 0.15  # seconds that are generated of a motion that goes round already
+# Seconds by which a transition may be longer than it has to be, where feet slide less so, and more than which
+# even the briefest one takes, where all others would be flagged; seconds of motion on either side with which
+# that is tried; metres that feet have to travel in it; the slide (cm/s) that counts as much as gliding does.
+TRIED, BRIEFEST, BESIDE, TRAVELS, GLIDING = 1.0, 0.3, 0.7, 0.2, 50.0
+# Seconds that are generated of a motion that goes round already, and more of them where something would be
+# flagged: a foot that is elsewhere can step.
+BRIDGES = (0.15, 0.3, 0.5)
 
 
 @dataclass(frozen=True)
@@ -118,8 +121,8 @@ class Cycle:
 def cycle(clip: Clip) -> Cycle:
     """The part of a motion that loops best: of a walk one stride or several, of a dance a figure.
 
-    The one whose ends are most alike, of those that close without anything that would be flagged; where none
-    does, the one in which feet slide least.
+    The one whose ends are most alike, of those that close without anything that would be flagged, the sooner
+    the better; where none does, the one in which least is, and feet slide least.
 
     Raises:
         RequestError: no humanoid, or nothing in it comes back.
@@ -132,38 +135,58 @@ def cycle(clip: Clip) -> Cycle:
             "no pose of it is like one that was there half a second to eight seconds before",
             "Loop all of it (without --trim, or cycle): then a way back to the beginning is generated.",
         )
-    slides: dict[Cycle, float] = {}
-    for begin, end, apart in found:
-        bridge = min(max(2, round(BRIDGE * clip.fps)), end - begin - 2)
-        one = Cycle(begin, end - bridge, bridge, apart)
-        (closed,) = stitch([clip.slice(one.start, one.stop)], one.frames, loop=True).report.gaps
-        if not any(note.startswith("flagged") for note in closed.notes):
-            return one
-        slides[one] = (closed.foot_slide or 0.0) + GLIDING * (closed.gliding or 0.0)
-    return min(slides, key=lambda one: slides[one])
+    judged: dict[Cycle, tuple[int, float]] = {}
+    for seconds in BRIDGES:
+        for begin, end, apart in found:
+            bridge = min(max(2, round(seconds * clip.fps)), end - begin - 2)
+            one = Cycle(begin, end - bridge, bridge, apart)
+            (closed,) = stitch([clip.slice(one.start, one.stop)], one.frames, loop=True).report.gaps
+            judged[one] = _judged(closed)
+            if not judged[one][0]:
+                return one
+    return min(judged, key=lambda one: judged[one])
 
 
 def _tried(
     line: timeline.Timeline, method: str | Method, action: str, seed: int | None
 ) -> tuple[list[int], list[str]]:
-    """How long each gap should be, and why: where strides do not tell it, as long as feet slide least with
-    the motion beside it, from its length on up to TRIED more."""
+    """How long each gap should be, and why: as long as strides tell, or else as long as feet slide least with
+    the motion beside it, from its length on up to TRIED more; of those in which least is flagged. Where
+    something is in each, shorter ones are tried, too."""
     lengths, whys, fps = [], [], line.clip.fps
     for way, gap in zip(line.ways, line.gaps):
-        near, slides = round(BESIDE * fps) + 1, {}
+        near, own, by = round(BESIDE * fps) + 1, len(gap), max(1, round(fps / 10))
         ends = (
             line.clip.slice(max(0, gap.start - near), gap.start),
             line.clip.slice(gap.stop, gap.stop + near),
         )
-        for length in range(len(gap), len(gap) + round(TRIED * fps) + 1, max(1, round(fps / 10))):
-            if way.in_step:
+        judged: dict[int, tuple[int, float]] = {}
+        longer, shorter = (
+            range(own, own + round(TRIED * fps) + 1, by),
+            range(own - by, round(BRIEFEST * fps), -by),
+        )
+        for length in (*longer, *shorter):
+            clean = [flags == 0 for flags, _ in judged.values()]
+            if (clean and way.in_step and clean[0]) or (length < own and any(clean)):
                 break
             pair = timeline.lay(ends, length)
             (report,) = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps
-            if report.foot_slide is None or (report.foot_travel or 0.0) < TRAVELS:
+            flags, slides = _judged(report)
+            goes = report.foot_slide is not None and (report.foot_travel or 0.0) >= TRAVELS
+            if goes or flags or length == own:
+                judged[length] = flags, slides
+            if not goes and not flags:
                 break
-            slides[length] = report.foot_slide + GLIDING * (report.gliding or 0.0)
-        lengths.append(min(slides, key=lambda length: slides[length], default=len(gap)))
-        least = f"feet slide least, of {len(slides)} lengths tried (the shortest: {way.why})"
-        whys.append(least if lengths[-1] > len(gap) else way.why)
+        best = min(judged, key=lambda length: judged[length])
+        lengths.append(best)
+        least = (
+            f"least is flagged, and feet slide least, of {len(judged)} lengths tried (at first: {way.why})"
+        )
+        whys.append(least if best != own else way.why)
     return lengths, whys
+
+
+def _judged(report: GapReport) -> tuple[int, float]:
+    """How much is flagged in a gap, and how far feet slide in it, or glide."""
+    flags = sum(note.startswith("flagged") for note in report.notes)
+    return flags, (report.foot_slide or 0.0) + GLIDING * (report.gliding or 0.0)
