@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.skeletons.rigs import under_root
+from tests.skeletons.rigs import TARGET, under_root
 
 import interpose
 from interpose.clip import Clip, Skeleton
@@ -13,7 +13,7 @@ from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.observation import Observation
 from interpose.observation.timeline import Placement
-from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.carrier import hips_of, moved
 
 
 def _off(one: Clip, other: Clip) -> np.ndarray:
@@ -52,6 +52,26 @@ def test_a_suit_that_knows_no_places(cmu_walk, rig):
     done = interpose.recover(_stuck(clip, 0, len(clip)), place=True)
     assert _off(done.clip, clip).max() < 0.2
     assert np.abs((done.clip.positions() - clip.positions())[..., 1]).max() < 0.03
+
+
+@pytest.mark.parametrize("told", [{}, {"place": True, "frames": (80, 120)}], ids=["found", "told"])
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_root_that_is_held_goes_with_the_body_again(cmu_walk, told, turns):
+    """As in game engines; all else hangs from it."""
+    clip = under_root(cmu_walk, goes=True)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    if turns:
+        # The root faces as the body goes, and all else is turned back against it.
+        yaw = rotations.about("Y", np.linspace(0.0, 1.0, len(clip)))
+        turned, placed = clip.kinematics()
+        clip = moved(clip, {0: (rotations.multiply(yaw, turned[:, 0]), placed[:, 0])})
+        clip = moved(clip, {joint: (turned[:, joint], placed[:, joint]) for joint in (1, TARGET)})
+        rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    translation[80:120, 0] = translation[79, 0]
+    done = interpose.recover(clip.with_motion(rotation, translation), **told).clip
+    assert _off(done, clip)[80:120].mean() < 0.03
+    aside = (done.positions()[:, 0] - done.positions()[:, 1])[:, [0, 2]]
+    assert np.linalg.norm(aside, axis=-1).max() < 0.01
 
 
 def test_hips_that_stand_still_are_found(cmu_walk):

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose.clip import Clip, Skeleton
 from interpose.formats import load
@@ -257,6 +258,19 @@ def test_tiny_and_still_clips(frames):
 def test_a_real_walk_has_no_frozen_body(cmu_walk):
     found = [f for f in scan(cmu_walk) if f.kind not in ("rest pose", "outlier")]
     assert found == []
+
+
+def test_a_root_that_is_held_with_its_turns_is_a_frozen_body(cmu_walk):
+    """It is above the hips, whose own place and turns go on: neither is a gap."""
+    clip = under_root(cmu_walk, goes=True)
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
+    rotation[:, 0] = rotations.multiply(
+        rotations.about("Y", np.linspace(0.0, 1.0, len(clip))), rotation[:, 0]
+    )
+    rotation[80:110, 0], translation[80:110, 0] = rotation[79, 0], translation[79, 0]
+    held = scan(clip.with_motion(rotation, translation))
+    assert spans(held) == [("frozen body", ("root",), 80, 110)]
+    assert to_gaps(held) == []
 
 
 @pytest.mark.parametrize("step", [0.5, 1.0])

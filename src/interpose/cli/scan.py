@@ -35,7 +35,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     """
     from interpose.finish.feet import legs
     from interpose.observation.scan import OR, scan, stays, to_gaps
-    from interpose.skeletons.carrier import place_of
+    from interpose.skeletons.carrier import line_of
 
     clip = reading.load(file)
     found = scan(clip)
@@ -123,11 +123,11 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             say(f"interpose stitch {halves} --frames 2 {says}")
     if any(one.kind == "frozen body" for one in found):
         say(f"interpose recover {quote(str(file))} restores a held body, its place and turns at once.")
-    body = (clip.skeleton.names[place_of(clip)],)
+    body = {(clip.skeleton.names[joint],) for joint in line_of(clip)}
     stands = [one for one in found if one.kind == "frozen position"]
-    if any(one.joints == body for one in stands) and legs(clip.skeleton):
+    if any(one.joints in body for one in stands) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")
-    if [one for one in stands if one.joints != body]:
+    if [one for one in stands if one.joints not in body]:
         say(f"interpose recover {quote(str(file))} leads over what else stands still.")
     for line in suit:
         say(line)

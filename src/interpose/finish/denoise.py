@@ -31,7 +31,7 @@ from interpose.observation.broken import medians
 from interpose.observation.scan import intact
 from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
 from interpose.skeletons import find_mapping
-from interpose.skeletons.carrier import hips_of, placed
+from interpose.skeletons.carrier import hips_of, line_of, placed
 from interpose.skeletons.targets import seated
 
 # How stiff smoothers may be: from one that takes out hardly anything to one that leaves parts of a minute.
@@ -207,8 +207,7 @@ def _shaken(clip: Clip, free: Observation) -> float:
     of which all is known.
     """
     hips = hips_of(clip.skeleton)
-    carriers = [joint for joint in placed(clip) if joint in (hips, *clip.skeleton.ancestors(hips))]
-    if not find_mapping(clip.skeleton).usable or not free.translation[:, carriers[-1:]].all():
+    if not find_mapping(clip.skeleton).usable or not free.translation[:, line_of(clip)[-1:]].all():
         return 0.0
     places = clip.positions()
     shaken = float(deviation(places[:, [hips]])[0])

@@ -21,7 +21,7 @@ from interpose.observation.stiff import PACE, TELEPORTS, TIMES, even, held, held
 from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation, restless
 from interpose.skeletons import SIDES, find_mapping
 from interpose.skeletons.carrier import STILL as UNMOVED
-from interpose.skeletons.carrier import hips_of, place_of, placed
+from interpose.skeletons.carrier import hips_of, line_of, placed
 
 # A value that changes less than this from frame to frame stands still: radians and metres. Captured motion
 # trembles by 1e-4 and more; files keep about 1e-8.
@@ -485,8 +485,9 @@ def _held_place(clip: Clip, findings: list[Finding]) -> list[Finding]:
 def _bodies(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Where the place of the body and the turns of its hips are held at once, one finding of both, and of
     whatever else is held just then: trackers that lose a body hold all of it."""
-    skeleton, where = clip.skeleton, place_of(clip)
-    names = {skeleton.names[joint] for joint in (where, hips_of(skeleton))}
+    skeleton = clip.skeleton
+    line = {skeleton.names[joint] for joint in line_of(clip)}
+    names = {*line, skeleton.names[hips_of(skeleton)]}
     for place in [one for one in findings if one.kind == "frozen position"]:
         same = [
             one
@@ -495,7 +496,7 @@ def _bodies(clip: Clip, findings: list[Finding]) -> list[Finding]:
             if max(abs(one.start - place.start), abs(one.stop - place.stop)) <= APART
         ]
         turns = {name for one in same for name in one.joints or ()}
-        if place.joints != (skeleton.names[where],) or not turns & names:
+        if not {*(place.joints or ())} <= line or not turns & names:
             continue
         joints = tuple(name for name in skeleton.names if name in turns)
         note = f"neither moves nor turns for {len(place) / clip.fps:.2f} s, while something else goes on"

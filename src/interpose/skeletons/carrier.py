@@ -39,12 +39,16 @@ def placed(clip: Clip) -> list[int]:
     return sorted({*clip.skeleton.roots, hips, *clip.skeleton.ancestors(hips)} & set(clip.translated))
 
 
-def place_of(clip: Clip) -> int:
-    """The lowest of the joints `placed` that the hips hang from, or are: who is there beside them, or what,
-    says nothing of the body."""
+def line_of(clip: Clip) -> list[int]:
+    """Those of the joints `placed` that the hips hang from, or are, the topmost first: who is there beside
+    them, or what, says nothing of the body."""
     hips = hips_of(clip.skeleton)
-    line = {hips, *clip.skeleton.ancestors(hips)}
-    return [joint for joint in placed(clip) if joint in line][-1]
+    return [joint for joint in placed(clip) if joint in (hips, *clip.skeleton.ancestors(hips))]
+
+
+def place_of(clip: Clip) -> int:
+    """The lowest of these, which moves the body and leaves a root above it where it is."""
+    return line_of(clip)[-1]
 
 
 def carriers(clip: Clip) -> list[int]:

@@ -16,7 +16,7 @@ from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import Exchange, Flip, crossovers, exchanges, put_back
 from interpose.observation.scan import intact, strays, stuck
-from interpose.skeletons.carrier import place_of
+from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
 
 # Seconds by which somebody may miss the frame at which limbs change sides.
@@ -64,7 +64,7 @@ def recover(
                 "Name them: --map, or load(..., roles=...).",
             )
         seen = Observation.full(clip)
-        seen.translation[start:stop, place_of(clip)] = False
+        seen.translation[start:stop, [place_of(clip), *_going(clip, start, stop)]] = False
         if (start, stop) == (0, len(clip)):
             # The first frame counts that belongs to the motion.
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
@@ -117,6 +117,14 @@ def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completi
     return replace(done, provenance=provenance, report=report)
 
 
+def _going(clip: Clip, start: int, stop: int) -> list[int]:
+    """The joints above the hips that carry them outside of frames start to stop - 1: a root that stays where
+    it is in all others is right."""
+    others = np.delete(clip.translation, np.s_[start:stop], axis=0)
+    ways = np.ptp(others, axis=0).max(axis=-1) if len(others) else np.zeros(len(clip.translated))
+    return [joint for joint in line_of(clip) if ways[clip.translated.index(joint)] > STILL]
+
+
 def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
     """What is left of a clip without what was lost in frames start to stop - 1: what `recover` finds."""
     seen, odd = intact(clip), strays(clip)
@@ -125,7 +133,9 @@ def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
         held = [clip.skeleton.index(name) for name in one.joints or ()]
         if one.kind == "frozen body":
             seen.rotation[one.start : one.stop, held] = False
-            held = [place_of(clip)]
+            held = line_of(clip)
+        elif {*held} & {*line_of(clip)}:
+            held = [*held, place_of(clip)]
         # A rest pose beside the frames in which a body is stuck does not tell where it is either.
         beside = [frame for frame in odd if one.start - 1 <= frame <= one.stop]
         seen.translation[np.ix_([*range(one.start, one.stop), *beside], held)] = False
