@@ -9,7 +9,9 @@ import pytest
 from tests.skeletons.rigs import TARGET, under_root
 
 import interpose
+from interpose.finish import Provenance
 from interpose.geometry import rotations
+from interpose.observation import Gap
 from interpose.skeletons.carrier import moved
 from interpose.skeletons.targets import seated
 
@@ -37,6 +39,24 @@ def test_a_target_stays_on_its_foot_in_a_gap(rigged, cmu_walk, gap):
     assert done.translation[seen].tobytes() == rigged.translation[seen].tobytes()
     foot = rigged.skeleton.index("LeftFoot")
     assert np.linalg.norm(done.positions()[:, foot] - same.positions()[:, foot - 2], axis=-1).max() < 0.05
+
+
+def test_a_target_goes_along_with_a_leg_that_is_lost(rigged):
+    """It is known itself, and was left where the foot had been. In a gap that stays open nothing moves."""
+    leg = Gap(60, 110, ("LeftUpLeg", "LeftLeg", "LeftFoot"))
+    done = interpose.recover(rigged, leg.joints, frames=(60, 110), method="small")
+    assert off(done.clip).max() < 1e-6
+    assert np.abs(done.clip.positions()[60:110, TARGET] - rigged.positions()[60:110, TARGET]).max() > 0.02
+    assert "ik_foot_l goes along with what it sits on" in done.report.gaps[0].notes
+    assert (done.provenance[60:110, TARGET] == Provenance.CORRECTED).all()
+    seen = np.setdiff1d(np.arange(len(rigged)), np.arange(60, 110))
+    assert done.clip.translation[seen].tobytes() == rigged.translation[seen].tobytes()
+    (left,) = interpose.fill(rigged, [leg], max_gap=20).report.open
+    assert len(left) == 50
+    kept = interpose.fill(rigged, [leg], max_gap=20).clip
+    assert kept.translation.tobytes() == rigged.translation.tobytes()
+    arm = interpose.recover(rigged, ["RightArm", "RightForeArm"], frames=(60, 110), method="small").clip
+    assert arm.translation.tobytes() == rigged.translation.tobytes()
 
 
 def test_a_target_stays_on_its_foot_on_the_way_to_another_clip(rigged):

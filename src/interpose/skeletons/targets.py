@@ -16,6 +16,20 @@ from interpose.skeletons.mapping import find_mapping
 LOOSE, TURNS = 5e-3, np.radians(3)
 
 
+def following(clip: Clip, known: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """(F, J) True for known joints that sit on a joint of the body, as `seated` finds them, in frames in
+    which it is not known where that is: they go along, or a foot would be pulled back to where it was.
+
+    clip, known, turns: as in `seated`.
+    """
+    found, whole = np.zeros(known.shape, bool), known & turns
+    for joint in _beside(clip, whole):
+        turned, placed = clip.kinematics()
+        if seats := _seats(turned, placed, joint, whole, clip.skeleton):
+            found[:, joint] = whole[:, joint] & ~_both(joint, seats[0][0], whole, clip.skeleton)
+    return found
+
+
 def seated(clip: Clip, known: np.ndarray, turns: np.ndarray) -> Clip:
     """The clip with joints beside the hips where they belong in frames in which they are unknown.
 
@@ -25,27 +39,49 @@ def seated(clip: Clip, known: np.ndarray, turns: np.ndarray) -> Clip:
 
     known, turns: (F, J) which local translations, and which local rotations, are known.
     """
-    skeleton, mapping = clip.skeleton, find_mapping(clip.skeleton)
-    if not mapping.usable:
-        return clip
-    hips, whole = hips_of(skeleton), known & turns
-    line = skeleton.below[:, hips] | skeleton.below[hips]
-    free = np.logical_not(known | turns)
+    whole, free = known & turns, np.logical_not(known | turns)
     # Parents come first: what hangs from a target goes along, and is then put where it belongs itself.
-    for joint in sorted(clip.translated):
-        local = clip.translation[whole[:, joint], clip.translated.index(joint)]
-        if line[joint] or not free[:, joint].any() or len(local) < 2 or np.ptp(local, axis=0).max() < STILL:
+    for joint in _beside(clip, whole):
+        if not free[:, joint].any():
             continue
         turned, placed = clip.kinematics()
-        against = (_against(turned, placed, joint, seat, whole, skeleton) for seat in mapping.mapped[1])
-        if seats := [one for one in against if one is not None]:
-            seat, turn, place = min(seats, key=lambda one: float(np.linalg.norm(one[2].mean(axis=0))))
+        if seats := _seats(turned, placed, joint, whole, clip.skeleton):
+            seat, turn, place = seats[0]
             turn = rotations.multiply(turned[:, seat], turn)
             place = placed[:, seat] + rotations.rotate(turned[:, seat], place)
             at = free[:, joint, None]
             there = np.where(at, turn, turned[:, joint]), np.where(at, place, placed[:, joint])
             clip = moved(clip, {joint: there})
     return clip
+
+
+def _beside(clip: Clip, whole: np.ndarray) -> list[int]:
+    """The joints beside the hips of a humanoid that move against their parents, parents first."""
+    skeleton = clip.skeleton
+    if not find_mapping(skeleton).usable:
+        return []
+    hips, found = hips_of(skeleton), []
+    line = skeleton.below[:, hips] | skeleton.below[hips]
+    for joint in sorted(clip.translated):
+        local = clip.translation[whole[:, joint], clip.translated.index(joint)]
+        if not line[joint] and len(local) > 1 and np.ptp(local, axis=0).max() >= STILL:
+            found.append(joint)
+    return found
+
+
+def _seats(
+    turned: np.ndarray, placed: np.ndarray, joint: int, whole: np.ndarray, skeleton: Skeleton
+) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """What a joint sits on, the nearest first; see `_against`."""
+    joints = find_mapping(skeleton).mapped[1]
+    against = (_against(turned, placed, joint, seat, whole, skeleton) for seat in joints)
+    seats = [one for one in against if one is not None]
+    return sorted(seats, key=lambda one: float(np.linalg.norm(one[2].mean(axis=0))))
+
+
+def _both(joint: int, seat: int, whole: np.ndarray, skeleton: Skeleton) -> np.ndarray:
+    """(F,) where it is known how one joint lies to another: what both hang from does not matter."""
+    return np.asarray(whole[:, skeleton.below[joint] ^ skeleton.below[seat]].all(axis=1))
 
 
 def _against(
@@ -58,8 +94,7 @@ def _against(
         turned, placed: (F, J, 4) and (F, J, 3) global rotations and positions.
         whole: (F, J) which joints are known.
     """
-    # What both hang from does not matter.
-    both = np.asarray(whole[:, skeleton.below[joint] ^ skeleton.below[seat]].all(axis=1))
+    both = _both(joint, seat, whole, skeleton)
     if both.sum() < 2:
         return None
     back = rotations.conjugate(turned[both, seat])

@@ -20,6 +20,7 @@ from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
 from interpose.skeletons import find_humanoid
+from interpose.skeletons.targets import following, seated
 from interpose.tasks.moments import mended, momentary, with_moments
 from interpose.tasks.planning import Job, plan, seed_of
 from interpose.tasks.windows import OVERLAP, Piece, joined, paste, put_together, shifted, together
@@ -73,6 +74,7 @@ def fill(
     """
     observation = gaps if isinstance(gaps, Observation) else Observation.from_gaps(clip, gaps)
     observation.check(clip)
+    going = None if isinstance(gaps, Observation) else following(clip, *_known(observation))
     seed = seed_of(seed)
     max_gap = None if max_gap is None else longest(max_gap, clip.fps)
     observation = replace(observation, pins=(*observation.pins, *pins))
@@ -110,7 +112,32 @@ def fill(
             progress((done + 1) / len(work))
     left = [job.gap for job in jobs if job.method is None]
     filled = whole.completion(Report(registry.name_of(method), whole.told(), left, action))
+    if going is not None and going.any():
+        for gap in left:
+            going[gap.start : gap.stop] = False
+        return _with_targets(filled, observation, going)
     return with_moments(filled, clip, brief) if brief else filled
+
+
+def _known(observation: Observation) -> tuple[np.ndarray, np.ndarray]:
+    """Which translations, and which rotations, are known, as `skeletons.targets` takes it."""
+    return observation.translation, observation.rotation
+
+
+def _with_targets(done: Completion, observation: Observation, going: np.ndarray) -> Completion:
+    """A completion in which targets of feet and hands, where they are `going` (F, J), sit where they did."""
+    clip = seated(done.clip, *(some & ~going for some in _known(observation)))
+    names = np.array(clip.skeleton.names)
+
+    def told(gap: GapReport) -> GapReport:
+        if not (some := going[gap.start : gap.stop].any(axis=0)).any():
+            return gap
+        said = "goes along with what it sits on" if some.sum() == 1 else "go along with what they sit on"
+        return replace(gap, notes=(*gap.notes, f"{', '.join(names[some])} {said}"))
+
+    provenance = np.where(going, Provenance.CORRECTED, done.provenance).astype(done.provenance.dtype)
+    report = replace(done.report, gaps=[told(gap) for gap in done.report.gaps])
+    return replace(done, clip=clip, provenance=provenance, report=report)
 
 
 class _Whole:
