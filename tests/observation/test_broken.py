@@ -158,6 +158,19 @@ def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
     assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 
 
+@pytest.mark.parametrize("frames", [40, 80])
+def test_hips_that_face_backwards_for_a_while_are_found(cmu_walk, frames):
+    """For as long as a body may be somewhere else; an arm that is away for as long may be meant."""
+    rotation, hips, arm = cmu_walk.rotation.copy(), 0, cmu_walk.skeleton.index("LeftArm")
+    part = slice(60, 60 + frames)
+    for joint, angle in ((hips, np.pi), (arm, 1.5)):
+        turned = rotations.multiply(rotations.about("Y", np.array(angle)), rotation[part, joint])
+        rotation[part, joint] = turned
+    lost = ~broken(cmu_walk.with_motion(rotation, cmu_walk.translation)).rotation
+    assert np.flatnonzero(lost[:, hips]).tolist() == [*range(60, 60 + frames)]
+    assert not lost[:, arm].any()
+
+
 @pytest.mark.parametrize("frames", [12, 30, 80])
 @pytest.mark.parametrize("start", [15, 60, 120])
 def test_who_walks_on_while_he_is_somewhere_else_is_found(cmu_walk, start, frames):

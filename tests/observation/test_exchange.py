@@ -13,7 +13,7 @@ from interpose import formats, tasks
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import kinematics, rotations
 from interpose.observation import exchange
-from interpose.observation.exchange import Crossing, Exchange, Flip, exchanges, put_back
+from interpose.observation.exchange import Bend, Crossing, Exchange, Flip, exchanges, put_back
 from interpose.observation.scan import OR, scan, to_gaps
 from interpose.skeletons import JOINTS, PARENTS, SIDES, find_humanoid
 
@@ -226,6 +226,30 @@ def test_a_knee_that_bends_the_other_way_is_found_and_turned_back(cmu_walk, limb
     assert np.abs(done.clip.positions() - clip.positions())[:, joints].max() < 1e-9
     (said,) = [one for one in scan(odd) if one.kind == "flipped"]
     assert said.joints == (limb[0], limb[2])
+
+
+@pytest.mark.parametrize("part", [(60, 80), (30, 150), (0, 208)])
+@pytest.mark.parametrize("name", ["LeftLeg", "RightLeg"])
+def test_a_knee_that_bends_the_wrong_way_by_itself_is_found_and_bent_back(cmu_walk, part, name):
+    """For however long, as where a program loses signs; the bend that was put in is the one taken out."""
+    clip = cmu_walk.slice(1, 209)
+    knee, body = clip.skeleton.index(name), find_humanoid(clip)
+    odd = put_back(clip, [Bend(*part, knee, body)])
+    assert np.abs(odd.positions() - clip.positions()).max() > 0.3
+    said = [one for one in scan(odd) if one.kind == "flipped"]
+    assert {(one.joints, one.note) for one in said} == {((name,), "bends the wrong way")}
+    done = interpose.recover(odd)
+    off = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1)[:, knee:]
+    assert off.max() < 0.25 * np.linalg.norm(odd.positions() - clip.positions(), axis=-1).max()
+    assert off.mean() < 0.005
+    assert [one.joint for one in done.report.exchanged] == [name]
+
+
+def test_where_both_knees_bend_the_wrong_way_all_along_nothing_is_bent(cmu_walk):
+    """It is rather the body that is taken to face backwards."""
+    clip = cmu_walk.slice(1, 209)
+    body, knees = find_humanoid(clip), [clip.skeleton.index(name) for name in ("LeftLeg", "RightLeg")]
+    assert exchanges(put_back(clip, [Bend(0, 208, knee, body) for knee in knees])) == []
 
 
 @pytest.fixture(scope="module")

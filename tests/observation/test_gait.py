@@ -99,5 +99,11 @@ def test_of_ways_to_go_round_the_first_one_counts_that_closes_well(walk, monkeyp
         monkeypatch.setattr(stitching, "stitch", closing(slides, flagged))
         assert tasks.cycle(walk).start == found[chosen][0]
     slides = [50.0, 40.0, 60.0, 70.0, 80.0][: len(found)]
-    monkeypatch.setattr(stitching, "stitch", closing(slides, len(found)))
+    every = [*slides, *(slide + 30.0 for slide in slides), *(slide + 20.0 for slide in slides)]
+    monkeypatch.setattr(stitching, "stitch", closing(every, len(every)))
     assert tasks.cycle(walk).start == found[1][0]
+    # A longer way back, in which a foot may step, where something is flagged in each of the shortest.
+    monkeypatch.setattr(stitching, "stitch", closing(every, len(found)))
+    longer = tasks.cycle(walk)
+    assert longer.start == found[0][0]
+    assert longer.frames > tasks.stitching.BRIDGES[0] * walk.fps + 1

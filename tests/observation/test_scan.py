@@ -273,6 +273,18 @@ def test_a_root_that_is_held_with_its_turns_is_a_frozen_body(cmu_walk):
     assert to_gaps(held) == []
 
 
+def test_two_dropouts_near_each_other_do_not_tremble(cmu_walk):
+    """To fall to zero and come back four times in a second is all that happens."""
+    rotation, translation = cmu_walk.rotation.copy(), cmu_walk.translation.copy()
+    for part in (slice(80, 95), slice(99, 112)):
+        rotation[part], translation[part] = [1.0, 0.0, 0.0, 0.0], 0.0
+    found = scan(cmu_walk.with_motion(rotation, translation))
+    assert [one for one in spans(found) if one[2] > 1] == [
+        ("frozen", None, 80, 95),
+        ("frozen", None, 99, 112),
+    ]
+
+
 @pytest.mark.parametrize("step", [0.5, 1.0])
 def test_angles_that_were_rounded_are_not_frozen(cmu_walk, step):
     """To half a degree, or a whole one: joints stand still between its steps. One that is away is found."""

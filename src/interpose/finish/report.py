@@ -183,7 +183,7 @@ class NoiseReport:
 @dataclass(frozen=True)
 class JointMoments:
     """The frames START:STOP in which a joint was lost for moments, amid known ones, and was interpolated; or
-    in which it had the turns of the other side, or was turned by half a turn."""
+    in which it had the turns of the other side, was turned by half a turn, or bent the wrong way."""
 
     joint: str
     frames: tuple[str, ...]
@@ -234,7 +234,9 @@ class Report:
         )
         what = f"{few(joints)}, in {', '.join(frames)}"
         rest = f"; left, without a like on the other side: {few(self.unpaired)}" * bool(self.unpaired)
-        return f"taken for the other side, or for half a turn, and put back: {what}{rest}"
+        return (
+            f"on the wrong side, half a turn about itself or bent the wrong way, and put back: {what}{rest}"
+        )
 
     def __repr__(self) -> str:
         return f"<Report of {self.method}>\n{self}"

@@ -21,7 +21,8 @@ from interpose.skeletons.carrier import hips_of, placed
 SAME = 1e-5
 # A value that is lost for longer (seconds) is no snap: `scan` finds it, `fill` and `recover` complete it.
 LONGEST = 1.0
-# Seconds that a body may be elsewhere: what it stands on tells for longer where it was.
+# Seconds that a body may be elsewhere, or its hips face elsewhere: what it stands on, and what hangs from
+# them, tells for longer where it was.
 LONGEST_PLACE = 3.0
 # A snap is further than this from what is around it (radians, metres), and than so many of the steps there:
 # a hinge that reaches its limit, which files write as its rest pose, arrives there with its own speed.
@@ -77,13 +78,15 @@ def broken(clip: Clip) -> Observation:
     seen, skeleton, placing = Observation.full(clip), clip.skeleton, placed(clip)
     none = np.tile(rotations.identity(), (len(skeleton), 1))
     turned = rotations.continuous(clip.rotation)
-    snaps, away, spikes, usual = _lost(turned, [skeleton.rest_rotation, none], SPIKE, clip.fps)
+    hips = hips_of(skeleton)
+    longest = np.where(np.arange(len(skeleton)) == hips, LONGEST_PLACE, LONGEST)
+    snaps, away, spikes, usual = _lost(turned, [skeleton.rest_rotation, none], SPIKE, clip.fps, longest)
     lost = snaps | _exchanged(clip, away)
     seen.rotation[lost | (spikes & _real(clip, lost, spikes, usual))] = False
     places = clip.translation[:, [clip.translated.index(joint) for joint in placing]]
     homes = [skeleton.rest_translation[placing], np.zeros((len(placing), 3))]
-    gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps)
-    seen.translation[:, placing] = ~(gone | away | spikes | _left(places, snaps[:, hips_of(skeleton)]))
+    gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps, np.full(len(placing), LONGEST_PLACE))
+    seen.translation[:, placing] = ~(gone | away | spikes | _left(places, snaps[:, hips]))
     again = (np.diff(snaps, axis=0, prepend=False) & snaps).sum(axis=0) >= MANY
     return _smoother(clip, seen, snaps & again)
 
@@ -134,11 +137,11 @@ def roughness(lost: np.ndarray, *clips: Clip) -> Iterator[tuple[int, int, list[n
 
 
 def _lost(
-    values: np.ndarray, homes: list[np.ndarray], far: float, fps: float
+    values: np.ndarray, homes: list[np.ndarray], far: float, fps: float, longest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Which of the values (F, n, d) snap to one of the `homes` (n, d), which of the others are away, which of
     the rest are spikes, each (F, n), and the medians (F, n, d) of what is around each. `far` is SPIKE or
-    SPIKE_WAY."""
+    SPIKE_WAY, `longest` (n,) the seconds that they may be away."""
     snaps, away, spikes = (np.zeros(values.shape[:2], bool) for _ in range(3))
     usual = values.copy()
     for column in range(values.shape[1]):
@@ -146,8 +149,7 @@ def _lost(
         for home in homes:
             snaps[:, column] |= _snaps(own, home[column], max(1, round(LONGEST * fps)))
         good = np.flatnonzero(~snaps[:, column])
-        longest = LONGEST_PLACE if values.shape[2] == 3 else LONGEST
-        away[good, column] = _away(own[good], far, round(longest * fps))
+        away[good, column] = _away(own[good], far, round(longest[column] * fps))
         good = np.flatnonzero(~(snaps | away)[:, column])
         if len(good) > 2 * AROUND:
             if values.shape[2] == 3:

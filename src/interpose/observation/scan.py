@@ -127,13 +127,14 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "frozen body": the same, and the hips do not turn either, nor whichever of the listed joints, while
       something else goes on: fingers, a prop, somebody else. `recover` restores both at once.
     - "lost": joints that snap to their rest pose, or jump away and back, for up to a second (where the body
-      is, for up to three), or spikes of up to three frames: what `recover` restores.
+      is, or how its hips face, for up to three), or spikes of up to three frames: what `recover` restores.
     - "exchanged": arms, or legs, that have each other's turns for a while, hands and fingers with them where
       they do: `recover` puts them back.
       Where they do not change back within three seconds it may be in all other frames, and `recover` is told
       which (`frames`).
     - "flipped": a thigh and its shin, or an arm, that are turned by half a turn about the line between their
-      ends for a while, so that the knee bends backwards: `recover` turns them back.
+      ends for a while, so that the knee bends backwards; or a shin that bends so by itself, for however long,
+      as where signs were lost: `recover` turns them back.
     - "jump": the body, or joints against its hips, that are elsewhere from one frame to the next, and stay
       there: frames that were cut out, or a tracker that goes on with another marker. Nothing is missing.
     - "doubled": whole frames that are the one before while the body moves at .2 m/s or more on both sides,
@@ -669,6 +670,7 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
     """Frames in which the body trembles, or joints do of which nothing else is found, where all is known."""
     if not known.complete or len(clip) < FEWEST:
         return []
+    clip = _led_over(clip, findings)
     places = clip.positions()
     all_along = [(0, len(clip))] if deviation(places).mean() > NOISY else []
     found = [
@@ -677,7 +679,7 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         )
         for a, b in bursts(clip) or all_along
     ]
-    for a, b, joints in [] if all_along else restless(_without_spikes(clip, findings)):
+    for a, b, joints in [] if all_along else restless(clip):
         turns = 2 * np.degrees(deviation(rotations.continuous(clip.rotation[a:b, list(joints)])))
         named = tuple(clip.skeleton.names[joint] for joint in joints)
         note = f"trembles by {turns.max():.1f} degrees about each axis"
@@ -691,16 +693,21 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
     return found
 
 
-def _without_spikes(clip: Clip, findings: list[Finding]) -> Clip:
-    """The clip with the turns that lead over what is lost: one spike is no trembling."""
-    rotation, names = clip.rotation.copy(), clip.skeleton.names
+def _led_over(clip: Clip, findings: list[Finding]) -> Clip:
+    """The clip with values that lead straight over what is lost: to jump there and back is no trembling."""
+    rotation, translation = clip.rotation.copy(), clip.translation.copy()
     for one in findings:
-        if one.kind == "lost" and one.joints and one.start > 0 and one.stop < len(clip):
-            joints = [names.index(joint) for joint in one.joints]
-            share = np.arange(1, len(one) + 1)[:, None] / (len(one) + 1)
-            before, after = (rotation[[frame]][:, joints] for frame in (one.start - 1, one.stop))
-            rotation[one.start : one.stop, joints] = rotations.slerp(before, after, share)
-    return clip.with_motion(rotation, clip.translation)
+        if one.kind not in ("lost", "frozen", *STUCK) or not 0 < one.start < one.stop < len(clip):
+            continue
+        part, ends = slice(one.start, one.stop), [one.start - 1, one.stop]
+        joints = [*map(clip.skeleton.index, clip.skeleton.names if one.joints is None else one.joints)]
+        columns = [clip.translated.index(joint) for joint in joints if joint in clip.translated]
+        share = np.arange(1, len(one) + 1)[:, None] / (len(one) + 1)
+        before, after = rotation[ends][:, joints]
+        rotation[part, joints] = rotations.slerp(before[None], after[None], share)
+        near, far = translation[ends][:, columns]
+        translation[part, columns] = near + share[..., None] * (far - near)
+    return clip.with_motion(rotation, translation)
 
 
 def _turning(clip: Clip, joints: list[int]) -> tuple[str, ...]:

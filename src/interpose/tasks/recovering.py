@@ -14,7 +14,7 @@ from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
-from interpose.observation.exchange import Exchange, Flip, crossovers, exchanges, put_back
+from interpose.observation.exchange import Exchange, Taken, crossovers, exchanges, put_back
 from interpose.observation.scan import intact, strays, stuck
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
@@ -77,7 +77,7 @@ def recover(
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
 
 
-def swaps(clip: Clip, start: int, stop: int) -> list[Exchange | Flip]:
+def swaps(clip: Clip, start: int, stop: int) -> list[Taken]:
     """What was taken for something else within the frames start to stop - 1; or in all of them, as somebody
     says of a part of the clip from one change of sides to the next, or to an end, which they meet to NEAR."""
     within = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
@@ -101,7 +101,7 @@ def stretches(found: Sequence[Exchange], frames: int) -> Iterator[tuple[int, int
         yield from ((first, last, some[0]) for first, last in zip(cuts, cuts[1:]))
 
 
-def with_sides(done: Completion, swapped: Sequence[Exchange | Flip]) -> Completion:
+def with_sides(done: Completion, swapped: Sequence[Taken]) -> Completion:
     """A completion that also tells what was on the wrong side, and was put back."""
     if not swapped:
         return done
