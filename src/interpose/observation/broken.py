@@ -264,6 +264,12 @@ def _away(values: np.ndarray, far: float, longest: int) -> np.ndarray:
         least = BACK * min(sizes[before], sizes[last])
         # Who walks meanwhile comes back to elsewhere, by a jump that undoes the first one.
         undone = float(np.linalg.norm(jumps[before] + jumps[last]))
+        if values.shape[1] == 4:
+            # Who turns meanwhile is turned back as far, in the axes around him or in his own.
+            a, b, c, d = (values[at] for at in (before, before + 1, last, last + 1))
+            there = rotations.multiply(b, rotations.conjugate(a)), rotations.relative(a, b)
+            back = rotations.multiply(c, rotations.conjugate(d)), rotations.relative(d, c)
+            undone = min(undone, *(float(_apart(one, other)) for one, other in zip(there, back)))
         if min(undone, _apart(values[last + 1], values[before])) < least:
             away[before + 1 : last + 1] = True
     return away
