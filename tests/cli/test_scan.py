@@ -23,3 +23,21 @@ def test_what_jumps_near_an_end_is_lost_there(run, take, part, said):
     translation[part] += np.array([1.0, 0, 0.5])
     save(clip.with_motion(clip.rotation, translation), take.with_name("jumps.bvh"))
     assert said in run("scan", "jumps.bvh").out
+
+
+def test_what_interpose_filled_is_not_called_splined(run, take, monkeypatch):
+    """By the report beside the file, and those of its inputs; of any other file it is said."""
+    from interpose.observation import scan as looks
+
+    found = looks.Finding("splined", None, 61, 90, "made up")
+    monkeypatch.setattr(looks, "scan", lambda clip: [found])
+    assert run("fill", "take.bvh", "--gap", "60:90", "--method", "spline").code == 0
+    done = run("scan", "take.filled.bvh")
+    assert "filled by interpose, as the report beside it says: 60:90" in done.out
+    assert "nothing looks missing" in done.out
+    assert run("recover", "take.filled.bvh", "--joints", "LeftArm", "--frames", "120:140").code == 0
+    done = run("scan", "take.filled.recovered.bvh", "--json").json
+    assert (done["filled"], done["findings"]) == (["60:90", "120:140"], [])
+    assert "splined" in run("scan", "take.bvh").out
+    take.with_name("take.filled.json").write_text("{")
+    assert "splined" in run("scan", "take.filled.bvh").out

@@ -12,9 +12,12 @@ from interpose.cli.reading import Reading, describe, details
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
+    from interpose.observation import Gap
+    from interpose.observation.scan import Finding
 
 EASED = 0.3  # seconds on either side of a jump that a fill may lead over
 SHOWN = 10  # dropouts, of many
+CHAIN, BESIDE = 8, 3  # runs one after the other, and frames beside what they filled that are eased, too
 MOMENT = 0.5  # seconds before a jump, or after it, at an end of a clip that are lost rather than a part of it
 
 
@@ -38,7 +41,9 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     from interpose.skeletons.carrier import line_of
 
     clip = reading.load(file)
-    found = scan(clip)
+    made = _made(file, clip)
+    # What a network says is as smooth as what a program splines: it is not to be filled once more.
+    found = [one for one in scan(clip) if not (one.kind == "splined" and _within(one, made))]
     if json:
         findings = [
             {
@@ -50,9 +55,13 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             }
             for one in found
         ]
-        say_json({"input": str(file), **details(clip), "findings": findings})
+        told = [f"{gap.start}:{gap.stop}" for gap in made]
+        say_json({"input": str(file), **details(clip), "findings": findings, "filled": told})
         return
     say("\n".join(describe(file, clip)))
+    if made:
+        frames = ", ".join(dict.fromkeys(f"{gap.start}:{gap.stop}" for gap in made))
+        say(f"filled by interpose, as the report beside it says: {frames}")
     where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."
     suit = [where] if stays(clip) and legs(clip.skeleton) else []
     if not found:
@@ -99,8 +108,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     if any(one.kind == "noisy" for one in found):
         say(f"interpose denoise {quote(str(file))} smooths what trembles.")
     if any(one.kind == "repeated" for one in found):
-        made = quote(str(file.with_name(f"{file.stem}.even{file.suffix}")))
-        say(f"interpose convert {quote(str(file))} {made} --drop-repeated takes repeated frames out.")
+        even = quote(str(file.with_name(f"{file.stem}.even{file.suffix}")))
+        say(f"interpose convert {quote(str(file))} {even} --drop-repeated takes repeated frames out.")
     jumps = [one for one in found if one.kind == "jump"]
     if jumps:
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))
@@ -131,6 +140,36 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"interpose recover {quote(str(file))} leads over what else stands still.")
     for line in suit:
         say(line)
+
+
+def _made(file: Path, clip: Clip) -> list[Gap]:
+    """What interpose has filled, by the report beside a file, and those of the files that were its input."""
+    from interpose.errors import InterposeError
+    from interpose.observation.gapfile import is_report, read_gaps, read_json
+
+    made: list[Gap] = []
+    for _ in range(CHAIN):
+        report = file.with_suffix(".json")
+        content = read_json(report) if report.is_file() else None
+        told = content if isinstance(content, dict) and is_report(content) else {}
+        if told.get("frames") != len(clip) or Path(str(told.get("output"))).name != file.name:
+            break
+        try:
+            made += read_gaps(report, clip)
+        except InterposeError:
+            break
+        file = file.with_name(Path(str(told.get("input"))).name)
+    return sorted(made, key=lambda gap: (gap.start, gap.stop))
+
+
+def _within(one: Finding, made: list[Gap]) -> bool:
+    """Whether what was found lies in what was filled, but for a frame or two beside it."""
+    return any(
+        gap.start - BESIDE <= one.start
+        and one.stop <= gap.stop + BESIDE
+        and (gap.joints is None or {*(one.joints or ())} & {*gap.joints})
+        for gap in made
+    )
 
 
 def _with_below(clip: Clip, joints: tuple[str, ...]) -> list[str]:
