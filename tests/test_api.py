@@ -125,7 +125,8 @@ def test_what_does_not_fit_is_said(cmu_walk):
         (lambda: interpose.fill(cmu_walk, seen), "does not fit the clip"),
         (lambda: interpose.Observation(np.ones((5, 3, 4)), np.ones((5, 3, 4))), "does not fit"),
         (lambda: interpose.forecast(cmu_walk, 30.5), "whole number"),
-        (lambda: interpose.forecast(cmu_walk, "30"), "whole number"),
+        (lambda: interpose.forecast(cmu_walk, [30]), "whole number"),
+        (lambda: interpose.forecast(cmu_walk, "soon"), "cannot generate"),
         (lambda: interpose.between(cmu_walk, [0, 30.5, 75]), "no frame 30.5"),
         (lambda: interpose.fill(cmu_walk, (20, 60), seed=-1), "seed -1"),
         (lambda: interpose.fill(cmu_walk, (20, 60), seed="a"), "seed a"),
@@ -361,3 +362,19 @@ def test_results_go_from_process_to_process(data, tmp_path):
         NothingError("what", "why", "fix", "left", 4),
     ):
         assert vars(pickle.loads(pickle.dumps(error))) == vars(error)
+
+
+def test_how_many_frames_to_generate_may_be_said_in_seconds(cmu_walk):
+    """As on the command line."""
+    walk = cmu_walk.slice(1, 91)
+    assert len(interpose.forecast(walk, "0.5s", method="zero-velocity").clip) == 90 + 15
+    joined = interpose.stitch([walk.slice(0, 40), walk.slice(50, 90)], "0.4s", method="spline").clip
+    assert len(joined) == 40 + 12 + 40
+    for text in ("soon", "0s"):
+        with pytest.raises(interpose.RequestError, match="cannot generate"):
+            interpose.forecast(walk, text)
+
+
+def test_what_a_method_said_is_shown_in_a_line(cmu_walk):
+    done = interpose.fill(cmu_walk, (60, 90), method="small")
+    assert len(repr(done.raw)) < 500

@@ -173,7 +173,7 @@ def fill(
         wanted: Observation | list[Gap] = to_gaps(found)
         if not wanted:
             others = sorted({one.kind for one in found})
-            but = f" but what is {', '.join(others)}, as scan(clip) says" if others else ""
+            but = f" but these, of which scan(clip) says more: {', '.join(others)}" if others else ""
             raise NothingError(
                 "nothing to fill",
                 f"no gaps were given, and a scan finds nothing missing{but}",
@@ -212,7 +212,8 @@ def recover(
     Args:
         clip: a clip, or the path of one.
         joints: names; one name may stand alone. Without any, what was lost is found: joints that snap to
-            their rest pose and spikes, at any frames, and hips that stand still while they turn.
+            their rest pose and spikes, at any frames, and hips that stand still while they turn. A clip in
+            which nothing was comes back as it is.
         frames: "120:160" or (120, 160); None for all.
         method, seed, progress: as in `fill`.
         place: where the body is, is lost, and how it is turned is known: feet that stand tell it. Of a whole
@@ -312,7 +313,7 @@ def between(
 @checked
 def forecast(
     clip: Clip | str | Path,
-    frames: int | None = None,
+    frames: int | str | None = None,
     *,
     samples: int = 1,
     method: str | Method = "auto",
@@ -324,7 +325,7 @@ def forecast(
 
     Args:
         clip: a clip, or the path of one. Two seconds of it or more tell best how it goes on.
-        frames: how many are added, at the clip's own rate; 2 s of them without it.
+        frames: how many are added, at the clip's own rate, or "3s"; 2 s of them without it.
         samples: in how many ways; each has a seed of its own, counted up from `seed` or from 1.
         method: one of `method_names()`, or "auto".
         seed: of what is drawn at random. A single sample without a seed is the most likely one.
@@ -342,7 +343,8 @@ def forecast(
     """
     from interpose import tasks
 
-    return tasks.forecast(_clip(clip), frames, samples, method, seed, temperature, progress)
+    clip = _clip(clip)
+    return tasks.forecast(clip, _count(frames, clip), samples, method, seed, temperature, progress)
 
 
 @checked
@@ -385,8 +387,8 @@ def stitch(
     Args:
         clips: clips or paths; one is enough for a loop. `clip.slice(12, 80)` is a part of one. What is of
             another rig than the first is brought onto its skeleton (`retarget`).
-        frames: how many frames to generate: one number, or one for each gap; "auto" chooses what is
-            unhurried.
+        frames: how many frames to generate: one number, or one for each gap, or "1s"; "auto" chooses what
+            is unhurried.
         action: what the motion in the gaps is ("walk", ...), for methods that know actions.
         align: each following clip heads on where the one before it was heading, as far ahead as their paces
             lead. Without it clips stay where they lie.
@@ -407,10 +409,10 @@ def stitch(
     from interpose import tasks
     from interpose.clip import Clip
 
-    several = [clips] if isinstance(clips, Clip | str | Path) else clips
-    return tasks.stitch(
-        [_clip(clip) for clip in several], frames, align, loop, action, method, seed, progress
-    )
+    several = [_clip(clip) for clip in ([clips] if isinstance(clips, Clip | str | Path) else clips)]
+    if several:
+        frames = _count(frames, several[0])
+    return tasks.stitch(several, frames, align, loop, action, method, seed, progress)
 
 
 @checked
@@ -467,6 +469,13 @@ def _range(frames: Any, clip: Clip) -> tuple[int, int] | None:
             "a range of frames has no joints", "they are an argument of their own", "Write joints=."
         )
     return chosen.start, chosen.stop
+
+
+def _count(frames: Any, clip: Clip) -> Any:
+    """How many frames to generate: texts such as "2s" as a number, all else as it is."""
+    from interpose.observation.observation import frames_of
+
+    return frames_of(frames, clip.fps) if isinstance(frames, str) and frames != "auto" else frames
 
 
 def _gap(gap: Any, clip: Clip) -> Gap:

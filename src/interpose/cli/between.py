@@ -12,7 +12,7 @@ from cyclopts import Parameter
 from interpose.cli.console import effort, progress
 from interpose.cli.outputs import Outputs, finish
 from interpose.cli.reading import Reading, describe, split_names
-from interpose.cli.whole import Whole, frames_of
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -132,6 +132,7 @@ def _blocked(
     lines that say what was read.
     """
     from interpose.finish import on_rig_of
+    from interpose.observation.observation import frames_of
     from interpose.observation.scan import strays
     from interpose.tasks.blocking import blocked
 

@@ -12,7 +12,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
-from interpose.cli.whole import Whole, frames_of
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ def forecast(
     from interpose import tasks
     from interpose.cli.request import check_method
     from interpose.formats import save
+    from interpose.observation.observation import frames_of
 
     check_method(method, license)
     if samples > MOST:

@@ -21,6 +21,15 @@ from interpose.observation.observation import frame_at
 from interpose.observation.scan import NO_GAPS, STUCK, scan, to_gaps
 
 EASED = 0.4  # seconds over which joints of another clip are eased in and out
+# What a scan finds that is no gap, in words.
+LEFT = {
+    "jump": "jumps",
+    "noisy": "noise",
+    "repeated": "repeated frames",
+    "doubled": "doubled frames",
+    "splined": "what was splined",
+    "still": "what stands still",
+}
 OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
 
 
@@ -149,8 +158,8 @@ def _scanned(file: Path, clip: Clip) -> Request:
     kinds = [what for what, some in others.items() if some]
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""
     if not gaps:
-        seen = {one.kind for one in found} & {"jump", "repeated", "noisy", "splined", "still"}
-        but = left or (f"what is {', '.join(sorted(seen))}: interpose scan {file} says more" if seen else "")
+        seen = [what for kind, what in LEFT.items() if any(one.kind == kind for one in found)]
+        but = left or (f"{' and '.join(seen)}: interpose scan {file} says more" if seen else "")
         why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
         raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]

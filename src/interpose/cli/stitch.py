@@ -13,7 +13,7 @@ from cyclopts import Parameter
 from interpose.cli.console import names, progress, say, say_json, say_table, seconds
 from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
-from interpose.cli.whole import Whole, frames_of
+from interpose.cli.whole import Whole
 from interpose.errors import RequestError
 from interpose.formats.place import vectors_in_file
 from interpose.observation import Gap
@@ -232,6 +232,8 @@ def _fitted(piece: Piece, first: Clip) -> Piece:
 
 def _lengths(text: str, fps: float) -> str | list[int] | int:
     """auto, one number of frames or seconds, or several separated by commas."""
+    from interpose.observation.observation import frames_of
+
     if text == "auto":
         return text
     said = [frames_of(one, fps) for one in text.split(",")]

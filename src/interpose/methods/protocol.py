@@ -34,12 +34,12 @@ class Raw:
     """
 
     clip: Clip
-    positions: np.ndarray | None = None
+    positions: np.ndarray | None = field(default=None, repr=False)
     joints: tuple[int, ...] = ()
     notes: dict[str, Any] = field(default_factory=dict)
-    own: np.ndarray | None = None
-    stands: np.ndarray | None = None
-    expected: np.ndarray | None = None
+    own: np.ndarray | None = field(default=None, repr=False)
+    stands: np.ndarray | None = field(default=None, repr=False)
+    expected: np.ndarray | None = field(default=None, repr=False)
 
 
 class Method(Protocol):

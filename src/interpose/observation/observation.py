@@ -102,6 +102,18 @@ def frame_at(text: str, fps: float) -> int:
     return round(frame)
 
 
+def frames_of(text: str, fps: float) -> int:
+    """How many frames to generate: of "60", or "2s". RequestError for what is no number, or none."""
+    try:
+        count = frame_at(text.strip(), fps)
+    except (ValueError, OverflowError):
+        count = 0
+    if count < 1:
+        why = "it takes a number from 1 on, or seconds"
+        raise RequestError(f"cannot generate {text} frames", why, "Write 45, or 1.5s.")
+    return count
+
+
 def longest(max_gap: object, fps: float) -> int:
     """How many frames a gap may have: of 90, "90" or "3s". RequestError for what is none, or nothing."""
     try:
