@@ -53,7 +53,8 @@ def load(
             Estimated when None.
         skeleton: the .asf file that an .amc file belongs to. Found beside it when None.
         fps: frames a second of an .amc file, which does not say it. 120 when None.
-        roles: what is to be said about the joints: canonical joint to own joint, and "root"; see `Skeleton`.
+        roles: what is to be said about the joints: canonical joint to own joint, "root", and "hand": "left"
+            for a left-handed file; see `Skeleton`.
 
     What was estimated stands in `clip.source` (a `bvh.BvhSource` or `asf_amc.AmcSource`; its `describe()`
     gives lines to print).
