@@ -357,6 +357,7 @@ def test_half_an_hour_takes_less_than_a_gigabyte(data):
         ((20.0, 11.0), (0.0, None), (1.0, 0.1), (0, 0), False),
         ((20.0, 11.0), (0.0, 0.15), (1.0, 1.0), (0, 1), False),
         ((20.0, 99.0), (0.0, 0.15), (1.0, 1.0), (1, 0), True),
+        ((20.0, 99.0), (0.0, 0.15), (0.1, 0.1), (1, 0), True),
     ],
 )
 def test_a_transition_takes_longer_where_feet_slide_less(

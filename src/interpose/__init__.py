@@ -134,6 +134,8 @@ def fill(
 ) -> Completion:
     """Fill gaps of a clip; what is observed comes back unchanged, bit for bit.
 
+    But for IK targets that sit on what is lost in gaps of joints: they go along, and the report says so.
+
     Args:
         clip: a clip, or the path of one. Its values inside the gaps have no influence.
         gaps: one or several, each a Gap, "120:160" for frames 120 to 159, "4s:5.3s", "120:" to the end,

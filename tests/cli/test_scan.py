@@ -30,6 +30,7 @@ def test_what_interpose_filled_is_not_called_splined(run, take, monkeypatch):
     from interpose.observation import scan as looks
 
     found = looks.Finding("splined", None, 61, 90, "made up")
+    take.with_name("done").mkdir()
     monkeypatch.setattr(looks, "scan", lambda clip: [found])
     assert run("fill", "take.bvh", "--gap", "60:90", "--method", "spline").code == 0
     done = run("scan", "take.filled.bvh")
@@ -38,6 +39,15 @@ def test_what_interpose_filled_is_not_called_splined(run, take, monkeypatch):
     assert run("recover", "take.filled.bvh", "--joints", "LeftArm", "--frames", "120:140").code == 0
     done = run("scan", "take.filled.recovered.bvh", "--json").json
     assert (done["filled"], done["findings"]) == (["60:90", "120:140"], [])
+    assert (
+        run(
+            "recover", "take.filled.bvh", "--joints", "LeftArm", "--frames", "120:140", "-o", "done/x.bvh"
+        ).code
+        == 0
+    )
+    assert run("scan", "done/x.bvh", "--json").json["filled"] == ["60:90", "120:140"]
+    assert run("fill", "take.bvh", "--gap", "60:90", "--method", "spline", "-o", "done/take.bvh").code == 0
+    assert run("scan", "done/take.bvh", "--json").json["filled"] == ["60:90"]
     assert "splined" in run("scan", "take.bvh").out
     take.with_name("take.filled.json").write_text("{")
     assert "splined" in run("scan", "take.filled.bvh").out

@@ -50,6 +50,17 @@ def test_ankles_lie_where_those_of_the_body_point_to(cmu_walk: Clip) -> None:
     assert np.abs(np.linalg.norm(ways[0], axis=1) - np.linalg.norm(ways[1], axis=1)).max() > 0.01
 
 
+def test_a_spline_aims_at_nothing(cmu_walk: Clip) -> None:
+    """It interpolates angles, and of a thigh that is never known it has the rest pose, which it says."""
+    left, _ = feet.legs(cmu_walk.skeleton)
+    done = interpose.recover(cmu_walk, cmu_walk.skeleton.names[left.thigh], method="spline")
+    assert any("only the rest pose" in note for note in done.report.gaps[0].notes)
+    rest = cmu_walk.skeleton.rest_rotation[left.thigh]
+    np.testing.assert_allclose(
+        done.clip.rotation[:, left.thigh], np.tile(rest, (len(cmu_walk), 1)), atol=1e-9
+    )
+
+
 @pytest.mark.parametrize(("side", "most"), [(0, 0.09), (1, 0.06)])
 def test_of_a_lost_thigh_the_foot_is_where_it_steps(cmu_walk: Clip, side: int, most: float) -> None:
     """Off by less than where a network that knows the knee says the thigh alone: by .107 and .070 m."""

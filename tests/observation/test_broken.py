@@ -51,9 +51,18 @@ def test_a_spike_at_an_end_is_found(cmu_walk, lost, name):
     expected = np.ones_like(seen.rotation)
     expected[lost, joint] = False
     np.testing.assert_array_equal(seen.rotation, expected)
-    rotation = walk.rotation.copy()
-    rotation[lost] = walk.rotation[100]
-    assert broken(walk.with_motion(rotation, walk.translation)).complete
+    rotation, translation = walk.rotation.copy(), walk.translation.copy()
+    rotation[lost], translation[lost] = walk.rotation[100], walk.translation[100]
+    assert broken(walk.with_motion(rotation, translation)).complete
+
+
+def test_spikes_at_both_ends_leave_what_is_between(cmu_walk):
+    """Of the two jumps the second one undoes the first."""
+    walk = cmu_walk.slice(1, 61)
+    translation = walk.translation.copy()
+    translation[[0, 1, -2, -1]] += [0.8, 0.0, 0.5]
+    lost = ~broken(walk.with_motion(walk.rotation, translation)).translation[:, 0]
+    assert np.flatnonzero(lost).tolist() == [0, 1, 58, 59]
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3])

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import build
 
 import interpose
 from interpose import formats, tasks
@@ -249,7 +250,31 @@ def test_where_both_knees_bend_the_wrong_way_all_along_nothing_is_bent(cmu_walk)
     """It is rather the body that is taken to face backwards."""
     clip = cmu_walk.slice(1, 209)
     body, knees = find_humanoid(clip), [clip.skeleton.index(name) for name in ("LeftLeg", "RightLeg")]
-    assert exchanges(put_back(clip, [Bend(0, 208, knee, body) for knee in knees])) == []
+    for start, stop in ((0, 208), (20, 190)):
+        assert exchanges(put_back(clip, [Bend(start, stop, knee, body) for knee in knees])) == []
+
+
+def test_where_the_motion_tells_how_knees_bend_nothing_is_bent(cmu_walk):
+    """What is wrong for the most part would be right, and all else bent."""
+    clip, _ = build("unreal", cmu_walk.slice(1, 209))
+    body = find_humanoid(clip)
+    assert body.rest.how == "motion"
+    odd = put_back(clip, [Bend(40, 150, body.mapping["LeftLeg"], body)])
+    assert exchanges(odd) == []
+
+
+def test_a_bend_is_found_beside_arms_that_change_sides_and_put_back_in_part(cmu_walk):
+    clip = cmu_walk.slice(1, 209)
+    knee, body = clip.skeleton.index("LeftLeg"), find_humanoid(clip)
+    odd = swapped(put_back(clip, [Bend(0, 208, knee, body)]), ARM, (60, 80))
+    assert {(one.kind, one.start, one.stop) for one in exchanges(odd)} == {
+        ("exchanged", 60, 80),
+        ("flipped", 0, 208),
+    }
+    done = interpose.recover(put_back(clip, [Bend(0, 208, knee, body)]), frames=(20, 100)).clip
+    off = np.linalg.norm(done.positions() - clip.positions(), axis=-1).max(axis=1)
+    assert off[20:100].max() < 0.1
+    assert off[100:].max() > 0.3
 
 
 @pytest.fixture(scope="module")

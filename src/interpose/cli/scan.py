@@ -55,13 +55,11 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             }
             for one in found
         ]
-        told = [f"{gap.start}:{gap.stop}" for gap in made]
-        say_json({"input": str(file), **details(clip), "findings": findings, "filled": told})
+        say_json({"input": str(file), **details(clip), "findings": findings, "filled": _frames(made)})
         return
     say("\n".join(describe(file, clip)))
     if made:
-        frames = ", ".join(dict.fromkeys(f"{gap.start}:{gap.stop}" for gap in made))
-        say(f"filled by interpose, as the report beside it says: {frames}")
+        say(f"filled by interpose, as the report beside it says: {', '.join(_frames(made))}")
     where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."
     suit = [where] if stays(clip) and legs(clip.skeleton) else []
     if not found:
@@ -114,11 +112,12 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     if jumps:
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))
         # Of a moment before the first one, or after the last, it is the rest that is right.
-        gap, what = f"{first - room}:{first + room}", "leads over the first jump"
-        moment = round(MOMENT * clip.fps)
-        if first <= moment:
+        around = f"{max(first - room, 1)}:{min(first + room, len(clip) - 1)}"
+        gap, what = around, "leads over the first jump"
+        moment, left = round(MOMENT * clip.fps), len(clip) - first
+        if first <= min(moment, left):
             gap, what = f"0:{first}", "fills anew what is before the first jump"
-        elif first >= len(clip) - moment:
+        elif left <= moment:
             gap, what = f"{first}:{len(clip)}", "fills anew what follows the first jump"
         said = f"interpose fill {quote(str(file))} --gap {gap}"
         if jumps[0].joints is not None:
@@ -148,8 +147,9 @@ def _made(file: Path, clip: Clip) -> list[Gap]:
     from interpose.observation.gapfile import is_report, read_gaps, read_json
 
     made: list[Gap] = []
-    for _ in range(CHAIN):
-        report = file.with_suffix(".json")
+    seen: set[Path] = set()
+    while (report := file.with_suffix(".json")).resolve() not in seen and len(seen) < CHAIN:
+        seen.add(report.resolve())
         content = read_json(report) if report.is_file() else None
         told = content if isinstance(content, dict) and is_report(content) else {}
         if told.get("frames") != len(clip) or Path(str(told.get("output"))).name != file.name:
@@ -158,8 +158,14 @@ def _made(file: Path, clip: Clip) -> list[Gap]:
             made += read_gaps(report, clip)
         except InterposeError:
             break
-        file = file.with_name(Path(str(told.get("input"))).name)
+        before = Path(str(told.get("input")))
+        beside = file.with_name(before.name)
+        file = before if before.with_suffix(".json").is_file() or beside == file else beside
     return sorted(made, key=lambda gap: (gap.start, gap.stop))
+
+
+def _frames(made: list[Gap]) -> list[str]:
+    return list(dict.fromkeys(f"{gap.start}:{gap.stop}" for gap in made))
 
 
 def _within(one: Finding, made: list[Gap]) -> bool:
@@ -167,7 +173,7 @@ def _within(one: Finding, made: list[Gap]) -> bool:
     return any(
         gap.start - BESIDE <= one.start
         and one.stop <= gap.stop + BESIDE
-        and (gap.joints is None or {*(one.joints or ())} & {*gap.joints})
+        and (gap.joints is None or (one.joints is not None and {*one.joints} <= {*gap.joints}))
         for gap in made
     )
 

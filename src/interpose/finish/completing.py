@@ -20,7 +20,7 @@ from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.opinion import certain, wipe
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance
-from interpose.methods.classical import Spline
+from interpose.methods.classical import Linear, Spline, ZeroVelocity
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Pin
 
@@ -84,7 +84,7 @@ def _complete(
         if hanging.any():
             return _laid(hanging, clip, observation, ask)
         parts = severed(hidden, certain(hidden, observation))
-        if parts.any():
+        if parts.any() and not isinstance(ask.method, Spline | Linear | ZeroVelocity):
             return _aimed(parts, clip, observation, ask)
     return guaranteed(clip, hidden, observation, ask)
 
@@ -106,8 +106,9 @@ def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -
 def _aimed(parts: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
     """Complete a clip without known `parts` (F, J) of legs whose thighs are lost, and aim these.
 
-    Not by networks that speak positions, which say where knees are: `cae` is off by 10.0 cm so where a joint
-    is lost, and by 9.1 by itself (`bench every --most 8`).
+    Not by what interpolates angles, which knows nothing of feet; nor by networks that speak positions, which
+    say where knees are: `cae` is off by 10.0 cm so where a joint is lost, and by 9.1 by itself (`bench every
+    --most 8`).
     """
     body = _complete(clip, without(observation, parts), ask, None)
     if body.raw.positions is not None:

@@ -72,20 +72,23 @@ def broken(clip: Clip) -> Observation:
     """What is left of a clip without values that were lost: an observation of it.
 
     Joints' rotations and the translations that place the body are looked at, each for itself: runs of up to
-    LONGEST in which it snaps to its rest value (or to no rotation, or to the origin) or jumps away and back,
-    and spikes of up to three frames.
+    LONGEST (LONGEST_PLACE of the hips and of places) in which it snaps to its rest value (or to no rotation,
+    or to the origin) or jumps away and back, and spikes of up to three frames, also at the ends.
     """
     seen, skeleton, placing = Observation.full(clip), clip.skeleton, placed(clip)
     none = np.tile(rotations.identity(), (len(skeleton), 1))
     turned = rotations.continuous(clip.rotation)
     hips = hips_of(skeleton)
     longest = np.where(np.arange(len(skeleton)) == hips, LONGEST_PLACE, LONGEST)
-    snaps, away, spikes, usual = _lost(turned, [skeleton.rest_rotation, none], SPIKE, clip.fps, longest)
+    leaping = _leaping(turned, SPIKE, clip.fps)
+    homes = [skeleton.rest_rotation, none]
+    snaps, away, spikes, usual = _lost(turned, homes, SPIKE, clip.fps, longest, leaping)
     lost = snaps | _exchanged(clip, away)
     seen.rotation[lost | (spikes & _real(clip, lost, spikes, usual))] = False
     places = clip.translation[:, [clip.translated.index(joint) for joint in placing]]
     homes = [skeleton.rest_translation[placing], np.zeros((len(placing), 3))]
-    gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps, np.full(len(placing), LONGEST_PLACE))
+    longest = np.full(len(placing), LONGEST_PLACE)
+    gone, away, spikes, _ = _lost(places, homes, SPIKE_WAY, clip.fps, longest, leaping)
     seen.translation[:, placing] = ~(gone | away | spikes | _left(places, snaps[:, hips]))
     again = (np.diff(snaps, axis=0, prepend=False) & snaps).sum(axis=0) >= MANY
     return _smoother(clip, seen, snaps & again)
@@ -137,18 +140,26 @@ def roughness(lost: np.ndarray, *clips: Clip) -> Iterator[tuple[int, int, list[n
 
 
 def _lost(
-    values: np.ndarray, homes: list[np.ndarray], far: float, fps: float, longest: np.ndarray
+    values: np.ndarray,
+    homes: list[np.ndarray],
+    far: float,
+    fps: float,
+    longest: np.ndarray,
+    leaping: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Which of the values (F, n, d) snap to one of the `homes` (n, d), which of the others are away, which of
     the rest are spikes, each (F, n), and the medians (F, n, d) of what is around each. `far` is SPIKE or
-    SPIKE_WAY, `longest` (n,) the seconds that they may be away."""
+    SPIKE_WAY, `longest` (n,) the seconds that they may be away, `leaping` (F,) the frames at the ends in
+    which the pose is another one, and none of them lost by itself."""
     snaps, away, spikes = (np.zeros(values.shape[:2], bool) for _ in range(3))
     usual = values.copy()
+    ends = np.array([_ends(own, ONE_SIDED * far, fps) for own in values.swapaxes(0, 1)]).T
+    ends &= ~leaping[:, None]
     for column in range(values.shape[1]):
         own = values[:, column]
         for home in homes:
             snaps[:, column] |= _snaps(own, home[column], max(1, round(LONGEST * fps)))
-        good = np.flatnonzero(~snaps[:, column])
+        good = np.flatnonzero(~(snaps | ends)[:, column])
         away[good, column] = _away(own[good], far, round(longest[column] * fps))
         good = np.flatnonzero(~(snaps | away)[:, column])
         if len(good) > 2 * AROUND:
@@ -161,12 +172,7 @@ def _lost(
             middle = np.where(twice[:, None], led, middle)
             spikes[good, column] |= twice
             usual[:, column] = middle[near]
-    # Where many are elsewhere at an end the pose is another one, and none of them lost by itself.
-    ends, others = (
-        np.array([_ends(values[:, column], least) for column in range(values.shape[1])]).T
-        for least in (ONE_SIDED * far, far / MANY)
-    )
-    ends &= (others.sum(axis=1, keepdims=True) < MANY) & ~(snaps | away)
+    ends &= ~(snaps | away)
     for column in np.flatnonzero(ends.any(axis=0)).tolist():
         good = np.flatnonzero(~ends[:, column])
         nearest = np.arange(len(values)).clip(good[0], good[-1])
@@ -175,9 +181,15 @@ def _lost(
     return snaps, away, spikes, usual
 
 
-def _ends(values: np.ndarray, far: float) -> np.ndarray:
-    """(F,) the first and the last frames, up to three, of values (F, d) that leap right after, or before."""
-    lost = np.zeros(len(values), bool)
+def _leaping(turned: np.ndarray, far: float, fps: float) -> np.ndarray:
+    """(F,) the first and the last frames, up to three, in which many rotations (F, J, 4) are elsewhere."""
+    return np.sum([_ends(own, far / MANY, fps) for own in turned.swapaxes(0, 1)], axis=0) >= MANY
+
+
+def _ends(values: np.ndarray, far: float, fps: float) -> np.ndarray:
+    """(F,) the first and the last frames, up to three, of values (F, d) that leap right after, or before: by
+    `far` at 30 frames a second, and further the fewer there are."""
+    lost, far = np.zeros(len(values), bool), far * max(1.0, 30.0 / fps)
     if len(values) > 4 * AROUND:
         own = _continuous(values) * 2.0 if values.shape[1] == 4 else values
         for forward in (1, -1):

@@ -188,17 +188,27 @@ def exchanges(clip: Clip) -> list[Taken]:
     found += [
         bend
         for bend in _bends(put_back(clip, found))
-        if not any(one.start < bend.stop and bend.start < one.stop for one in found)
+        if not any(
+            one.start < bend.stop
+            and bend.start < one.stop
+            and {bend.shin, clip.skeleton.parents[bend.shin]} & {*one.joints}
+            for one in found
+        )
     ]
     return sorted(found, key=lambda one: (one.start, one.joints))
 
 
 def _bends(clip: Clip) -> list[Bend]:
-    """Where knees bend the wrong way, from where they do at all on; none where hardly one ever bends
-    the right way: then it is rather the body that is taken to face backwards."""
+    """Where a knee bends the wrong way, from where it does at all on.
+
+    None where both do, or hardly one ever bends the right way: then it is rather the body that is taken to
+    face backwards. Nor on rigs of which the motion has to tell how knees bend.
+    """
     if not find_mapping(clip.skeleton).usable or not len(clip):
         return []
     body = find_humanoid(clip)
+    if body.rest.how == "motion":
+        return []
     local = kinematics.local_rotations(body.rotations(clip), PARENTS)
     found, wrong, right = [], 0, 0
     for name in ("LeftLeg", "RightLeg"):
@@ -216,7 +226,7 @@ def _bends(clip: Clip) -> list[Bend]:
             if far > max(1, LASTING * clip.fps) and part.min() > -FURTHEST:
                 wrong += far
                 found.append(Bend(start, stop, shin, body))
-    return found if right > SOME * wrong else []
+    return found if right > SOME * wrong and len({one.shin for one in found}) < 2 else []
 
 
 def crossovers(clip: Clip) -> list[Exchange]:

@@ -347,7 +347,8 @@ class _Steps:
         for joint, still in enumerate(self.still.T):
             brief = ([stop - start < self.shortest for start, stop in runs(part)] for part in (still, ~still))
             if any(sum(few) >= max(PAUSES, BRIEFLY * len(few)) for few in brief):
-                found[joint] = np.nanpercentile(self.turned[~still, joint], 25)
+                turns = self.turned[~still & np.isfinite(self.turned[:, joint]), joint]
+                found[joint] = np.percentile(turns, 25) if turns.size else 0.0
         return found
 
     def jump(self, joints: Sequence[int] | np.ndarray) -> float:

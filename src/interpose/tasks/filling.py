@@ -42,7 +42,8 @@ def fill(
     temperature: float = 1.0,
     zero: int = 0,
 ) -> Completion:
-    """Fill gaps of a clip. What is observed comes back unchanged, bit for bit.
+    """Fill gaps of a clip. What is observed comes back unchanged, bit for bit; but for targets of
+    feet and hands that sit on what is lost in gaps of joints, which go along.
 
     Args:
         clip: F frames; its values inside the gaps have no influence.

@@ -14,7 +14,7 @@ from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
-from interpose.observation.exchange import Exchange, Taken, crossovers, exchanges, put_back
+from interpose.observation.exchange import Bend, Exchange, Taken, crossovers, exchanges, put_back
 from interpose.observation.scan import intact, strays, stuck
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
@@ -80,7 +80,12 @@ def recover(
 def swaps(clip: Clip, start: int, stop: int) -> list[Taken]:
     """What was taken for something else within the frames start to stop - 1; or in all of them, as somebody
     says of a part of the clip from one change of sides to the next, or to an end, which they meet to NEAR."""
-    within = [one for one in exchanges(clip) if start <= one.start and one.stop <= stop]
+    within = []
+    for one in exchanges(clip):
+        if isinstance(one, Bend):  # each frame of it by itself
+            one = replace(one, start=max(start, one.start), stop=min(stop, one.stop))
+        if start <= one.start < one.stop <= stop:
+            within.append(one)
     if (start, stop) == (0, len(clip)):
         return within
     told, near = [], max(1, round(NEAR * clip.fps))

@@ -173,15 +173,14 @@ def _tried(
             (report,) = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps
             flags, slides = _judged(report)
             goes = report.foot_slide is not None and (report.foot_travel or 0.0) >= TRAVELS
-            if goes or flags or length == own:
+            if goes or flags or length == own or judged[own][0]:
                 judged[length] = flags, slides
             if not goes and not flags:
                 break
         best = min(judged, key=lambda length: judged[length])
         lengths.append(best)
-        least = (
-            f"least is flagged, and feet slide least, of {len(judged)} lengths tried (at first: {way.why})"
-        )
+        flagged = "least is flagged, and " * any(flags for flags, _ in judged.values())
+        least = f"{flagged}feet slide least, of {len(judged)} lengths tried (at first: {way.why})"
         whys.append(least if best != own else way.why)
     return lengths, whys
 
