@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -49,5 +51,10 @@ def test_what_interpose_filled_is_not_called_splined(run, take, monkeypatch):
     assert run("fill", "take.bvh", "--gap", "60:90", "--method", "spline", "-o", "done/take.bvh").code == 0
     assert run("scan", "done/take.bvh", "--json").json["filled"] == ["60:90"]
     assert "splined" in run("scan", "take.bvh").out
+    report = json.loads(take.with_name("take.filled.json").read_text())
+    for odd in ("", "..", "/", "a\0.bvh", 3, None, ["take.bvh"], "nowhere/x.bvh"):
+        take.with_name("take.filled.json").write_text(json.dumps(report | {"input": odd}))
+        done = run("scan", "take.filled.bvh", "--json")
+        assert (done.code, done.json["filled"]) == (0, ["60:90"])
     take.with_name("take.filled.json").write_text("{")
     assert "splined" in run("scan", "take.filled.bvh").out

@@ -158,7 +158,10 @@ def _made(file: Path, clip: Clip) -> list[Gap]:
             made += read_gaps(report, clip)
         except InterposeError:
             break
-        before = Path(str(told.get("input")))
+        name = told.get("input")
+        if not isinstance(name, str) or "\0" in name or not Path(name).suffix:
+            break
+        before = Path(name)
         beside = file.with_name(before.name)
         file = before if before.with_suffix(".json").is_file() or beside == file else beside
     return sorted(made, key=lambda gap: (gap.start, gap.stop))

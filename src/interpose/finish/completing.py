@@ -85,7 +85,7 @@ def _complete(
             return _laid(hanging, clip, observation, ask)
         parts = severed(hidden, certain(hidden, observation))
         if parts.any() and not isinstance(ask.method, Spline | Linear | ZeroVelocity):
-            return _aimed(parts, clip, observation, ask)
+            return _aimed(parts, clip, hidden, observation, ask)
     return guaranteed(clip, hidden, observation, ask)
 
 
@@ -103,7 +103,7 @@ def _laid(hanging: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -
     return _told_of(body, done, (STEPS, STEPPED) if anew else ())
 
 
-def _aimed(parts: np.ndarray, clip: Clip, observation: Observation, ask: Ask) -> Completion:
+def _aimed(parts: np.ndarray, clip: Clip, hidden: Clip, observation: Observation, ask: Ask) -> Completion:
     """Complete a clip without known `parts` (F, J) of legs whose thighs are lost, and aim these.
 
     Not by what interpolates angles, which knows nothing of feet; nor by networks that speak positions, which
@@ -112,7 +112,7 @@ def _aimed(parts: np.ndarray, clip: Clip, observation: Observation, ask: Ask) ->
     """
     body = _complete(clip, without(observation, parts), ask, None)
     if body.raw.positions is not None:
-        return guaranteed(clip, wipe(clip, observation), observation, ask)
+        return guaranteed(clip, hidden, observation, ask)
     layer = Layer(
         ask.method.name, aimed(body.clip, clip, parts), body.raw, np.zeros_like(parts), stands=False
     )
