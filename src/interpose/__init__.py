@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from interpose.methods.registry import names as method_names
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
-    from interpose.observation.scan import Finding
+    from interpose.observation.finding import Finding
     from interpose.tasks import Cycle, Forecast, Stitched
 
 __version__ = "0.1.0"
@@ -167,7 +167,7 @@ def fill(
     from interpose import tasks
     from interpose.errors import NothingError
     from interpose.observation import Observation, Part, Pin
-    from interpose.observation.scan import to_gaps
+    from interpose.observation.finding import to_gaps
 
     clip = _clip(clip)
     if gaps is None:

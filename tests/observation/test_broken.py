@@ -15,7 +15,7 @@ from interpose.geometry.time import runs
 from interpose.observation import Observation
 from interpose.observation import broken as module
 from interpose.observation.broken import BLOCK, _smoother, broken, medians
-from interpose.observation.scan import stuck
+from interpose.observation.frozen import stuck
 from interpose.skeletons.carrier import hips_of
 
 

@@ -15,7 +15,8 @@ from interpose.clip import Clip, Skeleton
 from interpose.geometry import kinematics, rotations
 from interpose.observation import exchange
 from interpose.observation.exchange import Bend, Crossing, Exchange, Flip, exchanges, put_back
-from interpose.observation.scan import OR, scan, to_gaps
+from interpose.observation.finding import to_gaps
+from interpose.observation.scan import OR, scan
 from interpose.skeletons import JOINTS, PARENTS, SIDES, find_humanoid
 
 LEG, ARM = ("UpLeg", "Leg", "Foot", "ToeBase"), ("Shoulder", "Arm", "ForeArm", "Hand")

@@ -12,7 +12,8 @@ from interpose.clip import Clip, Skeleton
 from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.observation import Gap, Observation
-from interpose.observation.scan import Finding, scan, to_gaps
+from interpose.observation.finding import Finding, to_gaps
+from interpose.observation.scan import scan
 
 NAMES = ("hips", "spine", "arm", "hand", "finger")
 SKELETON = Skeleton(NAMES, (-1, 0, 1, 2, 3), np.tile([0.0, 0.3, 0], (5, 1)))

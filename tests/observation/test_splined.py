@@ -8,7 +8,8 @@ from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.observation.scan import scan, to_gaps
+from interpose.observation.finding import to_gaps
+from interpose.observation.scan import scan
 from interpose.observation.splined import splined
 
 START, STOP = 60, 84  # .8 s

@@ -7,7 +7,9 @@ import pytest
 
 from interpose.clip import Clip
 from interpose.geometry import rotations
-from interpose.observation.scan import scan, stuck, to_gaps
+from interpose.observation.finding import to_gaps
+from interpose.observation.frozen import stuck
+from interpose.observation.scan import scan
 
 START, STOP = 80, 110
 

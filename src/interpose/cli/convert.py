@@ -111,7 +111,7 @@ def _convert(
     from interpose.finish import retarget
     from interpose.formats import save
     from interpose.geometry.time import resample, spread
-    from interpose.observation.scan import repeats
+    from interpose.observation.repeated import repeats
     from interpose.skeletons.fitting import other_rig
 
     output = _written(output, to)

@@ -72,7 +72,8 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
-    from interpose.observation.scan import NO_GAPS, OR, scan, stays
+    from interpose.observation.finding import NO_GAPS
+    from interpose.observation.scan import OR, scan, stays
 
     check_method(method, license)
     clip = reading.load(file)

@@ -16,9 +16,10 @@ from interpose.errors import NothingError, RequestError, unknown
 from interpose.formats.place import vectors_inside
 from interpose.formats.text import VALUE_LIMIT
 from interpose.observation import Gap, Observation, Part, Pin
+from interpose.observation.finding import NO_GAPS, STUCK, to_gaps
 from interpose.observation.gapfile import is_report, read_gaps, read_json
 from interpose.observation.observation import frame_at
-from interpose.observation.scan import NO_GAPS, STUCK, scan, to_gaps
+from interpose.observation.scan import scan
 
 EASED = 0.4  # seconds over which joints of another clip are eased in and out
 # What a scan finds that is no gap, in words.

@@ -13,7 +13,7 @@ from interpose.cli.reading import Reading, describe, details
 if TYPE_CHECKING:
     from interpose.clip import Clip
     from interpose.observation import Gap
-    from interpose.observation.scan import Finding
+    from interpose.observation.finding import Finding
 
 EASED = 0.3  # seconds on either side of a jump that a fill may lead over
 SHOWN = 10  # dropouts, of many
@@ -37,7 +37,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         json: print JSON for other programs.
     """
     from interpose.finish.feet import legs
-    from interpose.observation.scan import OR, scan, stays, to_gaps
+    from interpose.observation.finding import to_gaps
+    from interpose.observation.scan import OR, scan, stays
     from interpose.skeletons.carrier import line_of
 
     clip = reading.load(file)

@@ -16,7 +16,8 @@ from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import put_back
-from interpose.observation.scan import STUCK, Finding, intact, scan
+from interpose.observation.finding import STUCK, Finding
+from interpose.observation.scan import intact, scan
 from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import seed_of

@@ -15,7 +15,8 @@ from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import Bend, Exchange, Taken, crossovers, exchanges, put_back
-from interpose.observation.scan import intact, strays, stuck
+from interpose.observation.frozen import stuck
+from interpose.observation.scan import intact, strays
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
 
