@@ -57,6 +57,7 @@ __all__ = [
     "license",
     "load",
     "method_names",
+    "pose_to_pose",
     "recover",
     "resample",
     "retarget",
@@ -310,6 +311,51 @@ def between(
 
     several = [pins] if isinstance(pins, Pin) else list(pins)
     return tasks.between(_clip(clip), keys, action, method, seed, progress, path=path, pins=several)
+
+
+@checked
+def pose_to_pose(
+    start: Clip | str | Path,
+    target: Clip | str | Path,
+    frames: int | str = "auto",
+    anchors: Mapping[int, Clip | str | Path] | None = None,
+    action: str = "",
+    *,
+    method: str | Method = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    path: Mapping[int, Any] | None = None,
+    pins: Pin | Sequence[Pin] = (),
+) -> Completion:
+    """Generate the motion from the last pose of one clip to the first pose of another; both come back
+    unchanged, on the body of `start`, where they are in their clips.
+
+    Args:
+        start, target: clips, or paths; `clip.slice(0, 81)` is one that ends with frame 80, and
+            `clip.slice(12, 13)` a pose alone. What lies before the first pose and after the last one tells
+            how the body leaves and meets them. What is of another rig than `start` is retargeted.
+        frames: how many to generate between the two, or "1.5s"; "auto" chooses what is unhurried.
+        anchors: poses to be met on the way, by frame: the first of each clip. `start`'s is frame 0.
+        action: what the motion is, as in `between`.
+        method, seed, progress, path, pins: as in `fill`; frames count from `start`'s pose, which is 0.
+
+    Returns what `fill` does; `.clip` begins with the one pose and ends with the other. Raises what `between`
+    does, and RequestError for clips that cannot be brought onto one rig.
+    """
+    from interpose import tasks
+    from interpose.errors import is_number, unfit
+    from interpose.observation import Pin
+
+    first = _clip(start)
+    count = _count(frames, first)
+    if count != "auto" and not is_number(count, 1, whole=True):
+        raise unfit("frames", frames, 'a number from 1 on, seconds such as "1.5s", or "auto"')
+    poses = {when: _clip(clip) for when, clip in (anchors or {}).items()}
+    several = [pins] if isinstance(pins, Pin) else list(pins)
+    told = None if count == "auto" else int(count)
+    return tasks.pose_to_pose(
+        first, _clip(target), told, poses, action, method, seed, progress, path, several
+    )
 
 
 @checked

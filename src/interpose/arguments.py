@@ -84,6 +84,12 @@ SWITCH = (_is_switch, "True or False")
 KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
     "clip": CLIP,
     "like": CLIP,
+    "start": CLIP,
+    "target": CLIP,
+    "anchors": (
+        lambda value: value is None or (isinstance(value, Mapping) and all(map(_is_clip, value.values()))),
+        "clips, or paths, by frame, such as {20: clip}, or None",
+    ),
     "clips": (_are_clips, "clips, or paths of some"),
     "observation": (_is_observation, "an Observation, or None"),
     "method": (

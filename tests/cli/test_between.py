@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import interpose
 from interpose.formats import load, save
 from interpose.geometry import rotations
 
@@ -129,6 +130,34 @@ def test_poses_of_several_files(run, take):
     for frame, was in ((0, 10), (20, 30), (45, 0)):
         assert np.array_equal(made.rotation[frame], source.rotation[was])
         assert np.array_equal(made.translation[frame], source.translation[was])
+
+
+def test_poses_of_several_clips_in_python(run, take):
+    """As on the command line: how it leaves and meets them, anchors, points and pins count from the first."""
+    clip = load(take)
+    hand = clip.positions()[75, clip.skeleton.index("LeftHand")] + [0.0, 0.05, 0.0]
+    place = ",".join(f"{value / clip.source.unit:.9f}" for value in hand)
+    words = ["--start", "take.bvh#60", "--target", "take.bvh#90", "--anchor", "take.bvh#70@10"]
+    options = ["--frames", "1s", "--pin", f"LeftHand@20:{place}", "--player"]
+    assert run("between", *words, *options, "-o", "new.bvh").code == 0
+    pin = interpose.Pin("LeftHand", np.array([20]), hand[None])
+    done = interpose.pose_to_pose(
+        clip.slice(0, 61), clip.slice(90, len(clip)), "1s", {10: clip.slice(70, 71)}, pins=pin
+    )
+    assert len(done.clip) == 32
+    assert np.allclose(done.clip.positions(), load(take.with_name("new.bvh")).positions(), atol=1e-4)
+    assert np.linalg.norm(done.clip.positions()[20, clip.skeleton.index("LeftHand")] - hand) < 0.002
+    for frame, was in ((0, 60), (10, 70), (31, 90)):
+        assert np.array_equal(done.clip.rotation[frame], clip.rotation[was])
+
+
+def test_rest_poses_at_ends_are_no_keys_in_python(take):
+    clip = load(take).slice(20, 80)
+    rotation = clip.rotation.copy()
+    rotation[[0, -1]] = clip.skeleton.rest_rotation
+    odd = clip.with_motion(rotation, clip.translation)
+    made = interpose.pose_to_pose(odd, odd, 20, method="spline").clip
+    assert np.array_equal(made.rotation[[0, -1]], rotation[[-2, 1]])
 
 
 def test_files_tell_how_the_motion_leaves_and_meets_poses(run, take):

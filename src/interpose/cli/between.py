@@ -133,8 +133,7 @@ def _blocked(
     """
     from interpose.finish import on_rig_of
     from interpose.observation.observation import frames_of
-    from interpose.observation.scan import strays
-    from interpose.tasks.blocking import blocked
+    from interpose.tasks.blocking import blocked, edge
 
     met_at = [_met(text) for text in anchors]
     for k, (what, when) in enumerate(met_at):
@@ -151,11 +150,11 @@ def _blocked(
     said = [f"{path} is on another rig: its motion was retargeted" for path, other in others.items() if other]
     at = []
     for k, ((path, frame), clip) in enumerate(zip(named, clips)):
-        number = _moment(path, frame, clip, -1 if k == 0 else 0)
-        if frame is None and number in strays(clip):
-            odd, number = number, number + (-1 if k == 0 else 1)
+        usual = len(clip) - 1 if k == 0 else 0
+        number = edge(clip, last=k == 0) if frame is None else _checked(path, frame, clip)
+        if frame is None and number != usual:
             said.append(
-                f"frame {odd} of {path} has nothing to do with the one beside: frame {number} is taken"
+                f"frame {usual} of {path} has nothing to do with the one beside: frame {number} is taken"
             )
         at.append(number)
     met = {when: clip.slice(frame, frame + 1) for (_, when), clip, frame in zip(met_at, clips[2:], at[2:])}
@@ -181,10 +180,9 @@ def _named(text: str) -> tuple[Path, int | None]:
     return (Path(name), int(frame)) if name and frame.isdecimal() else (Path(text), None)
 
 
-def _moment(path: Path, frame: int | None, clip: Clip, usual: int) -> int:
-    """The frame of a clip that is meant; `usual` where none is named."""
-    number = usual % len(clip) if frame is None else frame
-    if number >= len(clip):
+def _checked(path: Path, frame: int, clip: Clip) -> int:
+    """The frame, if the clip has it."""
+    if frame >= len(clip):
         why = f"the clip has {len(clip)} frames, counted from 0"
-        raise RequestError(f"there is no frame {number} in {path}", why, f"Choose up to {len(clip) - 1}.")
-    return number
+        raise RequestError(f"there is no frame {frame} in {path}", why, f"Choose up to {len(clip) - 1}.")
+    return frame

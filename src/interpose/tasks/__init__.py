@@ -1,5 +1,6 @@
 """What the verbs mean: say what is observed, choose a method for each gap, complete, and report."""
 
+from interpose.tasks.blocking import pose_to_pose
 from interpose.tasks.denoising import denoise
 from interpose.tasks.filling import fill, fitted
 from interpose.tasks.forecasting import Forecast, forecast
@@ -20,6 +21,7 @@ __all__ = [
     "fitted",
     "forecast",
     "plan",
+    "pose_to_pose",
     "recover",
     "stitch",
 ]

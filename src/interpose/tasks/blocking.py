@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError
+from interpose.errors import RequestError, unfit
+from interpose.finish import Completion, on_rig_of
+from interpose.observation import Pin
+from interpose.observation.observation import frame_number
 from interpose.observation.scan import strays
 from interpose.observation.timeline import Placement, bounded, plausible_length
 from interpose.skeletons.carrier import hips_of
 from interpose.skeletons.fitting import fit
-from interpose.tasks.keys import block
+from interpose.tasks.keys import between, block
 from interpose.tasks.stitching import BESIDE
+
+if TYPE_CHECKING:
+    from interpose.methods.protocol import Method
 
 FASTEST = 20.0  # metres a second: no hand goes so fast
 
@@ -33,6 +40,60 @@ class Blocked:
     clip: Clip
     keys: list[int]
     said: tuple[str, ...]
+
+
+def edge(clip: Clip, last: bool) -> int:
+    """The first frame of a clip, or the `last` one; the one beside where that has nothing to do with it."""
+    frame = len(clip) - 1 if last else 0
+    return frame + (0 if frame not in strays(clip) else -1 if last else 1)
+
+
+def pose_to_pose(
+    start: Clip,
+    target: Clip,
+    frames: int | None = None,
+    anchors: Mapping[int, Clip] = {},
+    action: str = "",
+    method: str | Method = "auto",
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+    path: Mapping[int, Any] | None = None,
+    pins: Sequence[Pin] = (),
+) -> Completion:
+    """From the last pose of one clip to the first of another, which others may be met between; those two, and
+    what lies between them, on the skeleton of the first one.
+
+    Args:
+        start, target: the clips; what lies before the one pose and after the other tells how the body moves.
+        frames: how many lie between the two; None for as many as the way takes.
+        anchors: clips whose first pose is met so many frames after the first one.
+        action, method, seed, progress: as in `between`.
+        path, pins: as in `fill`; their frames count from the first pose on, which is 0.
+
+    Raises:
+        RequestError: as `between`, and for clips that cannot be brought onto the first one's rig.
+    """
+    for name, clip in (
+        ("start", start),
+        ("target", target),
+        *(("anchors", clip) for clip in anchors.values()),
+    ):
+        if not len(clip):
+            raise unfit(name, clip, "a clip of one frame or more")
+    on_rig = {frame_number(when): on_rig_of(clip, start) for when, clip in anchors.items()}
+    if wrong := [when for when in on_rig if when < 1]:
+        raise RequestError(
+            f"cannot meet an anchor at frame {wrong[0]}",
+            "the first pose is frame 0",
+            "Choose a frame from 1 on.",
+        )
+    poses = {when: clip.slice(at, at + 1) for when, clip in on_rig.items() for at in [edge(clip, False)]}
+    target = on_rig_of(target, start)
+    laid = blocked(start, edge(start, True), target, edge(target, False), poses, frames)
+    zero = laid.keys[0]
+    points = {zero + frame_number(frame): point for frame, point in (path or {}).items()}
+    later = [replace(pin, frames=zero + np.asarray(pin.frames)) for pin in pins]
+    return between(laid.clip, laid.keys, action, method, seed, progress, True, points, later)
 
 
 def blocked(
