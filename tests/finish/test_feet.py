@@ -464,6 +464,14 @@ def test_feet_that_slide_fast_are_told_where_nothing_tells_what_is_usual(walk, s
     assert said == [f"flagged: feet slide at {slide:.0f} cm/s"] * (slide > 30)
 
 
+@pytest.mark.parametrize(("length", "said"), [(1, 0), (4, 0), (8, 1)])
+def test_between_keys_that_follow_each_other_at_once_no_foot_slides(walk, length, said):
+    """Of every second frame of a walk the truth, too, may be at 70 cm/s."""
+    gap = Gap(60, 60 + length)
+    found = notes.skids(80.0, walk, gaps_of(walk, (gap.start, gap.stop)), gap, 0)
+    assert sum("feet slide" in note for note in found) == said
+
+
 @pytest.mark.parametrize("size", [0.4, 1.0, 3.0])
 def test_what_is_said_of_slides_and_errors_does_not_depend_on_how_large_a_body_is(walk, size):
     skeleton = replace(walk.skeleton, rest_translation=walk.skeleton.rest_translation * size)

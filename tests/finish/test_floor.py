@@ -76,16 +76,19 @@ def test_who_is_above_the_floor_is_not_touched(lying, cmu_walk):
 
 
 def test_feet_of_who_stands_tell_the_floor_where_enough_is_known(cmu_walk):
-    """Two keys may both be in the air."""
+    """Two keys may both be in the air; three are not."""
     seen, low = Observation.from_gaps(cmu_walk, [GAP]), sunk(cmu_walk)
-    keys = Observation.from_gaps(cmu_walk, [Gap(0, GAP.start - 1), GAP, Gap(GAP.stop + 1, len(cmu_walk))])
+    before, last = Gap(0, GAP.start - 1), len(cmu_walk)
+    keys = Observation.from_gaps(cmu_walk, [before, GAP, Gap(GAP.stop + 1, last)])
+    more = Observation.from_gaps(cmu_walk, [before, GAP, Gap(GAP.stop + 1, 140), Gap(141, last)])
     deepest = []
-    for known in (seen, keys):
+    for known in (seen, keys, more):
         deep, joints = floor.depth(low, known)
         ends = [joints.index(joint) for joint in feet.ends(cmu_walk.skeleton)]
         deepest.append(deep[GAP.start : GAP.stop, ends].max())
     assert deepest[0] > 0.08
     assert deepest[1] <= 0
+    assert deepest[2] > 0.08
 
 
 def test_toes_go_no_lower_than_toes_are_known_to(lying):

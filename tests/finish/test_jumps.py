@@ -5,10 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from interpose import Observation
+import interpose
+from interpose import Gap, Observation
 from interpose.clip import Clip
-from interpose.finish import jumps, seams
+from interpose.finish import jumps, notes, seams
+from interpose.finish.span import Span
+from interpose.geometry import rotations
 
 
 def with_a_sword(clip: Clip) -> Clip:
@@ -37,3 +41,48 @@ def test_what_is_held_in_a_hand_does_not_say_how_the_body_may_jump(cmu_walk):
         most.append(jumps.peak_limits(clip, known, limits))
     np.testing.assert_allclose(most[1][:count], most[0])
     assert most[1][-1] > 1.3 * most[0].max()
+
+
+def test_who_stands_before_keys_does_not_say_how_he_walks_through_them(cmu_walk):
+    """Ten still frames are no measure: networks' motion gave way to splines."""
+    frames = [60] * 10 + list(range(60, 181))
+    clip, keys = cmu_walk.take(frames), [9, 39, 69, 100, 130]
+    done = interpose.between(clip, keys)
+    assert {gap.method for gap in done.report.gaps} == {"base"}
+    assert all(gap.seam_after <= gap.seam_limit for gap in done.report.gaps)
+    # Where he stands velocities may jump as little as ever.
+    assert done.report.gaps[0].seam_limit < 5
+    off = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1).mean()
+    spline = interpose.between(clip, keys, method="spline").clip
+    assert off < 0.9 * np.linalg.norm(spline.positions() - clip.positions(), axis=-1).mean()
+
+
+def test_a_moment_of_motion_does_not_say_how_far_velocities_may_jump(cmu_walk):
+    """Inside of gaps: a second of it does."""
+    known, calm = Observation.full(cmu_walk.slice(0, 40)), np.full(len(cmu_walk.skeleton), 1e-4)
+    still = cmu_walk.take([60] * 40)
+    for frames, most in ((10, jumps.wild(still.skeleton)), (40, jumps.SETS_OFF)):
+        found = jumps.peak_limits(still.slice(0, frames), known.slice(0, frames), calm) * still.fps**2
+        assert found == pytest.approx(most)
+    assert jumps.wild(still.skeleton) > 1.5 * jumps.SETS_OFF
+
+
+def test_what_jumps_at_a_lone_key_is_said_and_softened(cmu_walk):
+    """Where no other frame is known nothing else tells."""
+    gaps = [Gap(0, 60), Gap(61, len(cmu_walk))]
+    known = Observation.from_gaps(cmu_walk, gaps)
+    rotation = cmu_walk.rotation.copy()
+    later = np.arange(1, 21)
+    turn = rotations.about("X", 0.2 * later * np.exp(-later / 6))
+    leg = cmu_walk.skeleton.index("LeftUpLeg")
+    rotation[61:81, leg] = rotations.multiply(rotation[61:81, leg], turn)
+    kinked = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    size = np.linalg.norm(seams.jumps(kinked, known, np.array([60])), axis=-1).max() * 900
+    assert size > jumps.wild(cmu_walk.skeleton)
+    assert "at frame 60" in notes.wild(kinked, known, gaps[0], 0)[0]
+    assert "at frame 160" in notes.wild(kinked, known, gaps[1], 100)[0]
+    for _ in range(3):
+        for span in (Span(0, 60, "any"), Span(61, 120, "any")):
+            jumps.soften(kinked, known, span, None)
+    size = np.linalg.norm(seams.jumps(kinked, known, np.array([60])), axis=-1).max() * 900
+    assert size < jumps.wild(cmu_walk.skeleton)

@@ -114,3 +114,13 @@ def test_a_gap_that_a_simpler_method_filled_is_said_to_be_its(cmu_walk, data):
         assert {one.method for one in done.report.gaps} == {"spline"}
         assert all(why.split(":")[0] in " ".join(one.notes) for one in done.report.gaps)
         assert (done.provenance[60] == Provenance.FALLBACK).any()
+
+
+@pytest.mark.parametrize("frames", [(146,), (150, 180), (145, 147)])
+def test_points_near_an_end_do_not_throw_the_body_beyond_them(cmu_walk, frames):
+    way = cmu_walk.root[GAP[1]] - cmu_walk.root[GAP[0] - 1]
+    across = 0.15 * np.array([way[2], -way[0]]) / np.hypot(way[0], way[2])
+    led = follow(cmu_walk, *GAP, {frame: cmu_walk.root[frame, [0, 2]] + across for frame in frames})
+    off = np.linalg.norm((led.root - cmu_walk.root)[:, [0, 2]], axis=1)
+    assert off[list(frames)] == pytest.approx(0.15, abs=1e-9)
+    assert off.max() < 0.151

@@ -9,7 +9,7 @@ import pytest
 
 from interpose import formats
 from interpose.clip import Clip
-from interpose.finish import complete, feet, guarantees
+from interpose.finish import complete, feet, guarantees, stepping
 from interpose.geometry import measures, rotations
 from interpose.methods.classical import Linear
 from interpose.methods.protocol import Raw
@@ -167,3 +167,21 @@ def test_what_is_known_of_a_leg_stays(standing):
     done, steps = filled(clip, Observation(rotation, known.translation))
     assert not steps
     assert (done.rotation[:, shin] == clip.rotation[:, shin]).all()
+
+
+def test_a_foot_that_is_on_its_way_at_a_key_does_not_stand_from_there_on(standing):
+    """Steps would stop it within a frame: what a method says is kept then."""
+    clip, known = keys(standing, 30, 60)
+    linear = Linear().complete(clip, known).clip
+    assert stepping.stepped(linear, known, (1, 30)) is not None
+    after = linear.take([*range(31), *[30] * 10])
+    rotation = after.rotation.copy()
+    for leg in feet.legs(after.skeleton):
+        swing = rotations.about("X", -0.25 * np.arange(1, 11))
+        rotation[31:, leg.thigh] = rotations.multiply(rotation[31:, leg.thigh], swing)
+        rotation[25:31, leg.thigh] = rotations.multiply(
+            rotation[25:31, leg.thigh], rotations.about("X", 0.25 * np.arange(5, -1, -1))
+        )
+    moving = after.with_motion(rotation, after.translation)
+    seen = Observation.from_gaps(moving, [Gap(1, 30), Gap(31, len(moving))])
+    assert stepping.stepped(moving, seen, (1, 30)) is None

@@ -133,7 +133,6 @@ def _row(name: str, clip: Clip, done: Completion, gap: Gap) -> list[str]:
 
 def _truth(clip: Clip, gap: Gap) -> list[str]:
     """The same measures of what was taken away."""
-    import numpy as np
 
     from interpose.cli.outputs import seam
     from interpose.finish import feet, jumps, seams
@@ -142,6 +141,6 @@ def _truth(clip: Clip, gap: Gap) -> list[str]:
     seen = Observation.from_gaps(clip, [gap])
     slide, travel = feet.measure(clip, seen, gap.start, gap.stop) or (0.0, 0.0)
     limits = seams.limits(clip, seen)
-    bounds = None if limits is None else jumps.Bounds(limits, np.full_like(limits, np.inf))
+    bounds = None if limits is None else jumps.Bounds.of(clip, seen, limits)
     jump, limit = (100 * (one or 0.0) for one in jumps.beside(clip, seen, gap, bounds) or (0.0, 0.0))
     return ["truth", seam(jump, limit), "0.00 cm", f"{slide:.1f} cm/s", f"{travel:.2f} m", "0.0 cm"]

@@ -25,9 +25,10 @@ BLEND = 0.15
 # How much the place of every other joint counts beside those that are lifted, round by round; and how many
 # times more those of feet do.
 SHARES, FEET = (1e-1, 1e-2), 10.0
-# Seconds that are to be known for feet to tell the floor; else they are lifted under hips that are lower than
-# this (metres) above it, as those of a body that does not stand. What is as far above the lowest is none.
-SEEN, LOW, ABOUT = 1.0, 0.5, 0.2
+# Poses that are to be known, so many seconds apart, for feet to tell the floor; else they are lifted under
+# hips that are lower than this (metres) above it, as those of a body that does not stand. What is as far
+# above the lowest is none.
+POSES, APART, LOW, ABOUT = 3, 0.1, 0.5, 0.2
 # How high hips are, in legs, of a body that stands or crouches on the floor.
 UPRIGHT = (0.75, 1.2)
 # Metres from a hand or the head within which what hangs from it is part of the body, as fingers are.
@@ -47,9 +48,9 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
     That is the lowest observed joint of poses of which a foot is; for ankles, and for toes, the lowest one of
     these, where that is about as low: knees on which a body kneels may lie deeper than feet ever do. The
     joints are those of the humanoid, and what its hands and head end in; what is observed is 0 deep, and so
-    are feet under hips that stand, where little is known: a single pose may have them in the air. Where no
-    foot is observed the floor is at height 0, as in most files, if hips are where those of a body are that
-    stands on it; else nothing is deep.
+    are feet under hips that stand, where fewer than three poses are known: one may have them in the air.
+    Where no foot is observed the floor is at height 0, as in most files, if hips are where those of a body
+    are that stands on it; else nothing is deep.
     """
     mapping, size = find_mapping(clip.skeleton), feet.size(clip.skeleton)
     joints, ends = [*mapping.mapped[1], *_beyond(mapping)], feet.ends(clip.skeleton)
@@ -66,7 +67,7 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
         own = float(heard[:, kind].min())
         bound[kind] = own if own - low < ABOUT * size else low
     below = np.where(observed, 0.0, bound - heights)
-    if tells.sum() < SEEN * clip.fps:
+    if np.unique(np.flatnonzero(tells) // max(1.0, APART * clip.fps)).size < POSES:
         stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
         below[:, ends] *= ~stands[:, None]
     return below[:, joints], joints

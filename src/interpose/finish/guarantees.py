@@ -140,9 +140,7 @@ class _Work:
         self.opinion, self.error = self._hear(self.raw)
         self.current = merge(self.opinion, hidden, known)
         limits = seams.limits(self.bare, known) if ask.limits is None else ask.limits
-        self.bounds = None
-        if limits is not None:
-            self.bounds = jumps.Bounds(limits, jumps.peak_limits(self.bare, known, limits))
+        self.bounds = None if limits is None else jumps.Bounds.of(self.bare, known, limits)
         self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
 
     def _hear(self, raw: Raw) -> tuple[Clip, np.ndarray | None]:
@@ -203,8 +201,6 @@ class _Work:
                     self.stepped[span.start, own] = STEPPED
                     _plant(current, self.firm, span, self.bounds, raw.stands)
                 _change(current, self.firm, span, floor.lifted)
-        if self.bounds is None:
-            return
         waiting, told = set(range(len(chosen))), [list[float]() for _ in chosen]
         for _ in range(ROUNDS):
             # What a span does can be seen from its neighbours, and from no other.
@@ -212,7 +208,7 @@ class _Work:
             for i, span in enumerate(chosen):
                 if i not in waiting | beside or _stalls(told[i]):
                     continue
-                if excess := jumps.soften(current, self.firm, span, self.bounds.seam):
+                if excess := jumps.soften(current, self.firm, span, self.bounds):
                     told[i].append(excess)
                     beside |= {i - 1, i, i + 1}
             waiting = beside
@@ -223,7 +219,7 @@ class _Work:
         ask, known, bounds = self.ask, self.known, self.bounds
         for span in self.spans:
             excess, above, _ = jumps.excess(self.current, known, span, bounds, ask.first)
-            span.problem = span.problem or (above if excess > 1 else None)
+            span.problem = span.problem or (above if excess > jumps.SLACK else None)
         failed = [s for s in self.spans if s.problem and (s.hopeless or ask.fallback.name != ask.method.name)]
         if not failed:
             return
@@ -269,7 +265,7 @@ class _Work:
             if steps := self.stepped.get(chosen):
                 span.notes.append((span.start, span.stop - 1, steps))
             excess, above, where = jumps.excess(current, known, span, self.bounds, ask.first)
-            if excess > 1:
+            if excess > jumps.SLACK:
                 span.notes.append((where, where, f"flagged: {above}"))
         columns = list(clip.translated)
         finished = clip.with_motion(

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from interpose.clip import Clip
+from interpose.clip import Clip, Skeleton
 from interpose.finish import feet, seams
 from interpose.finish.leading import led_over
 from interpose.finish.span import Span, write
@@ -25,17 +25,55 @@ MENDS, PATCHED = (0.1, 0.2, 0.4), 0.5
 # of keys half a turn apart, where networks may turn all at once, 23 fills jump so, and 5 once it is mended
 # (joints are off by 24.6 and 24.5 cm); between 80 pairs of any 3, and 1.
 TORN, WILD = 200.0, 100.0
+# Metres a second squared by which velocities may jump at a lone key, however still what is known elsewhere
+# is: half of 54 pieces of 5 s of LAFAN1's validation performer have a larger limit of their own. Who stands
+# before keys in which he walks is no measure for these.
+LONE = 15.0
+# Seconds of motion that are known at least for it to tell how far velocities may jump inside of gaps.
+TELLS = 1.0
+# By how much a limit may be passed: what is softened stops at it.
+SLACK = 1.02
 # The change of velocity (metres a second) beyond which none is softened: that is a jump in value.
 KINK = 8.0
 
 
 @dataclass(frozen=True)
 class Bounds:
-    """How far the velocity of each joint (J,) may jump, in metres per frame squared: at seams, and inside of
-    gaps."""
+    """How far the velocity of each joint may jump, in metres per frame squared.
+
+    Attributes:
+        seam: (J,) at seams, as much as in what is known.
+        peak: (J,) inside of gaps; and at lone keys, which lie inside of motion that is not known.
+        key: (J,) at lone keys before that is softened.
+    """
 
     seam: np.ndarray
     peak: np.ndarray
+    key: np.ndarray
+
+    @classmethod
+    def of(cls, clip: Clip, known: Observation, limits: np.ndarray) -> Bounds:
+        """Of what is known of a clip; `limits` (J,) are those of seams, see `seams.limits`."""
+        return cls(limits, peak_limits(clip, known, limits), np.maximum(limits, LONE / clip.fps**2))
+
+    @classmethod
+    def untold(cls, skeleton: Skeleton, fps: float) -> Bounds:
+        """Where nothing tells how the motion itself jumps, as between lone keys: not as no body does."""
+        torn = np.full(len(skeleton), TORN / fps**2)
+        return cls(np.full_like(torn, np.inf), torn, np.full_like(torn, wild(skeleton) / fps**2))
+
+    def at(self, known: Observation, frames: np.ndarray) -> np.ndarray:
+        """(n, J) at observed frames (n,)."""
+        return np.where(seams.lone(known, frames)[:, None], self.peak, self.seam)
+
+    def softened(self, known: Observation, frames: np.ndarray) -> np.ndarray:
+        """(n, J) at observed frames (n,), before that is softened."""
+        return np.where(seams.lone(known, frames)[:, None], self.key, self.seam)
+
+
+def wild(skeleton: Skeleton) -> float:
+    """Metres a second squared by which velocities of a body of this size seldom jump."""
+    return min(WILD * feet.size(skeleton), TORN)
 
 
 def inside(
@@ -45,7 +83,8 @@ def inside(
     frames = _inner(clip, np.arange(gap.start, gap.stop))
     if not frames.size:
         return None
-    return _nearest(seams.jumps(clip, known, frames), None if bounds is None else bounds.peak)
+    most = None if bounds is None else np.broadcast_to(bounds.peak, (len(frames), len(bounds.peak)))
+    return _nearest(seams.jumps(clip, known, frames), most)
 
 
 def share(clip: Clip, known: Observation, frames: np.ndarray, most: np.ndarray) -> float:
@@ -65,7 +104,9 @@ def beside(
     frames = _inner(clip, np.array([gap.start - 1, gap.stop]))
     if not frames.size:
         return None
-    return _nearest(seams.seam_jumps(clip, known, frames), None if bounds is None else bounds.seam)
+    return _nearest(
+        seams.seam_jumps(clip, known, frames), None if bounds is None else bounds.at(known, frames)
+    )
 
 
 def _inner(clip: Clip, frames: np.ndarray) -> np.ndarray:
@@ -74,10 +115,10 @@ def _inner(clip: Clip, frames: np.ndarray) -> np.ndarray:
 
 
 def _nearest(jumps: np.ndarray, most: np.ndarray | None) -> tuple[float, float | None]:
-    """Of jumps (n, J, 3) the one that comes nearest to what it may be (J,), and that."""
+    """Of jumps (n, J, 3) the one that comes nearest to what it may be (n, J), and that."""
     size = np.linalg.norm(jumps, axis=-1)
     row, joint = np.unravel_index((size if most is None else size / most).argmax(), size.shape)
-    return float(size[row, joint]), None if most is None else float(most[joint])
+    return float(size[row, joint]), None if most is None else float(most[row, joint])
 
 
 def peak_limits(hidden: Clip, known: Observation, limits: np.ndarray) -> np.ndarray:
@@ -87,13 +128,14 @@ def peak_limits(hidden: Clip, known: Observation, limits: np.ndarray) -> np.ndar
     Landings and kicks do so far beyond the limit of seams: the observed motion around it is asked, of a
     whole body, as an arm may do next what a leg did. What hangs on it, as a sword and fingers, goes its own
     ways: further than any joint of the body, which may not for that. What no body does is a glitch of the
-    file, and no measure for anything.
+    file, and no measure for anything. Nor is a moment of it, of a body that may have stood.
     """
     own = seams.own_jumps(hidden, known)
     largest = np.where(own < TORN / hidden.fps**2, own, 0.0).max(axis=0, initial=0.0)
     most = np.maximum(seams.PEAKS * limits, seams.OWN_PEAKS * largest)
     body = list(find_mapping(hidden.skeleton).mapped[1]) or slice(None)
-    return np.maximum(most, max(most[body].max(), SETS_OFF / hidden.fps**2))
+    least = SETS_OFF if len(own) >= TELLS * hidden.fps else wild(hidden.skeleton)
+    return np.maximum(most, max(most[body].max(), least / hidden.fps**2))
 
 
 def excess(
@@ -101,21 +143,20 @@ def excess(
 ) -> tuple[float, str, int]:
     """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
     words, and at which frame; words call the first frame `first`."""
-    # Between lone keys nothing tells how the motion itself jumps, and what no body does is too far.
     names = current.skeleton.names
-    torn = np.full(len(names), TORN / current.fps**2)
-    bounds = bounds or Bounds(np.full(len(names), np.inf), torn)
+    bounds = bounds or Bounds.untold(current.skeleton, current.fps)
     found = [(0.0, "", span.start)]
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     within = _inner(current, np.arange(span.start, span.stop))
-    for frames, jumps, most, where in (
-        (edges, seams.seam_jumps, bounds.seam, "at a seam"),
+    for frames, jumps, limits, where in (
+        (edges, seams.seam_jumps, bounds.at(known, edges), "at a seam"),
         (within, seams.jumps, bounds.peak, "inside the gap"),
     ):
         if frames.size:
             size = np.linalg.norm(jumps(current, known, frames), axis=-1)
+            most = np.broadcast_to(limits, size.shape)
             row, joint = np.unravel_index((size / most).argmax(), size.shape)
-            jump, limit, frame = float(size[row, joint]), float(most[joint]), int(frames[row])
+            jump, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
             words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
             found.append((jump / limit, f"{words} ({names[joint]}, frame {first + frame})", frame))
     return max(found)
@@ -126,8 +167,8 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
 
     Returns the frames start to stop - 1 of each, in order: none where too much of it would have to be.
     """
-    wild = min(WILD * feet.size(current.skeleton), TORN) / current.fps**2
-    most = np.full(len(current.skeleton), wild) if bounds is None else bounds.peak
+    usual = np.full(len(current.skeleton), wild(current.skeleton) / current.fps**2)
+    most = usual if bounds is None else bounds.peak
     lo, hi, (start, stop) = span.around(len(current), 3)
     # Not the frames beside seams: where a method does not arrive there, a spline would only hide it.
     frames, seen, led = np.arange(start + 1, stop - 1), known.slice(lo, hi), current.slice(lo, hi)
@@ -153,18 +194,22 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
     return [(lo + first, lo + last) for first, last in runs(places)]
 
 
-def soften(current: Clip, known: Observation, span: Span, limits: np.ndarray) -> float:
-    """Bring the jumps at the seams of a span below the limits (J,) of joints (metres per frame squared).
+def soften(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> float:
+    """Bring the jumps at the seams of a span below what they may be.
 
     Returns how many times too large the largest one was, or 0 where there was nothing to do.
     """
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     if not edges.size:
         return 0.0
-    size = np.linalg.norm(seams.seam_jumps(current, known, edges), axis=-1)
-    if not (size > limits).any() or size.max() >= KINK / current.fps:
+    bounds = bounds or Bounds.untold(current.skeleton, current.fps)
+    size, most = (
+        np.linalg.norm(seams.seam_jumps(current, known, edges), axis=-1),
+        bounds.softened(known, edges),
+    )
+    if not (size > most).any() or size.max() >= KINK / current.fps:
         return 0.0
     lo, hi, inner = span.around(len(current), 2)
-    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, limits)
+    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, bounds.softened)
     write(current, softer, span.start, inner)
-    return float((size / limits).max())
+    return float((size / most).max())

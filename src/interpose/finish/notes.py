@@ -47,6 +47,8 @@ SKIDS, SLIDES = 3.0, 15.0
 # Between lone keys, and where less than a second is known, feet that slide at so much alone are: half a turn
 # between two keys takes 21 cm/s in truth.
 UNSEEN = 30.0
+# Seconds of a gap from which on it is asked about at all: in shorter ones a foot is where its keys have it.
+SLIDING = 0.2
 # Metres by which a foot drifts in one stance, and twice as far as around the gap: no real one in 64 pieces of
 # LAFAN1's validation performer does, but in 9 % of fills.
 DRIFTS = 0.08
@@ -106,13 +108,13 @@ def others(skeleton: Skeleton, gap: Gap) -> list[str]:
 
 def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
     """A note where a joint's velocity jumps by more than in hardly any motion, in a gap beside which nothing
-    tells how the motion itself jumps."""
-    frames = np.arange(max(gap.start, 1), min(gap.stop, len(finished) - 1))
+    tells how the motion itself jumps; or beside it, at a lone key."""
+    frames = np.arange(max(gap.start - 1, 1), min(gap.stop + 1, len(finished) - 1))
     if not frames.size:
         return []
     size = np.linalg.norm(seams.jumps(finished, known, frames), axis=-1) * finished.fps**2
     row, joint = np.unravel_index(int(size.argmax()), size.shape)
-    if size[row, joint] <= jumps.WILD * feet.size(finished.skeleton):
+    if size[row, joint] <= jumps.SLACK * jumps.wild(finished.skeleton):
         return []
     where = f"{finished.skeleton.names[joint]} jumps at frame {first + int(frames[row])}"
     said = f"flagged: {where}, by {size[row, joint]:.0f} m/s^2"
@@ -166,7 +168,7 @@ def skids(slide: float | None, finished: Clip, known: Observation, gap: Gap, fir
     slid = feet.measure_all(part, seen, [(a + 1, b - 1) for a, b in whole if b - a > near // 2])
     most = max((one for one, _ in slid), default=None)
     least = feet.size(finished.skeleton) * (SLIDES if most is not None else UNSEEN)
-    if slide > max(SKIDS * (most or 0.0), least):
+    if slide > max(SKIDS * (most or 0.0), least) and len(gap) >= SLIDING * finished.fps:
         around = f", around the gap at {most:.0f} at most" if most is not None else ""
         said.append(f"flagged: feet slide at {slide:.0f} cm/s{around}")
     (way, joint, start, stop), *usual = feet.drifts(part, seen, [(gap.start - lo, gap.stop - lo), *whole])

@@ -179,19 +179,31 @@ def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
 
 
-def soften(motion: Clip, known: Observation, span: tuple[int, int], limits: np.ndarray) -> Clip:
-    """Bring velocity jumps at the seams of the span below the limits (J,), metres per frame squared.
+def lone(known: Observation, at: np.ndarray) -> np.ndarray:
+    """(n,) which of the observed frames (n,) are lone keys: something is missing on both sides."""
+    return ~(known.frames[at - 1] | known.frames[at + 1])
+
+
+def soften(
+    motion: Clip,
+    known: Observation,
+    span: tuple[int, int],
+    limits: Callable[[Observation, np.ndarray], np.ndarray],
+) -> Clip:
+    """Bring velocity jumps at the seams of the span below the limits of the joints at n observed frames (n,
+    J), metres per frame squared.
 
     The first missing pose is turned, as little as possible, so that joints that jump too far go on more like
     they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
     """
     at = edges(known, motion.translated, span)
-    jump = seam_jumps(motion, known, at)
+    jump, most = seam_jumps(motion, known, at), limits(known, at)
     size = np.linalg.norm(jump, axis=-1)
-    share = np.maximum(1 - MARGIN * limits / np.maximum(size, 1e-12), 0) * (size > limits)
+    with np.errstate(invalid="ignore"):  # where there is no limit
+        share = np.where(size > most, 1 - MARGIN * most / np.maximum(size, 1e-12), 0.0)
     excess = jump * share[..., None]
     # Joints far below their limit may give way for those above it.
-    weights = np.where(size > 0.7 * limits, 1.0, 0.05)
+    weights = np.where(size > 0.7 * most, 1.0, 0.05)
     # Each seam has a pose before and one after it; what is missing in both shares the work.
     edge, way = np.repeat(at, 2), np.tile([-1, 1], len(at))
     first = edge + way

@@ -20,7 +20,7 @@ import numpy as np
 from scipy import ndimage
 
 from interpose.clip import Clip
-from interpose.finish import feet
+from interpose.finish import feet, jumps, seams
 from interpose.finish.windows import envelope, ramp, spread
 from interpose.geometry import measures, rotations
 from interpose.geometry.ground import FLOOR
@@ -106,7 +106,9 @@ def stepped(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip | Non
     done, sunk = let_down(clip, known, angles, goal, span)
     if sunk > SINK * feet.size(clip.skeleton):
         done, _ = let_down(_over_feet(clip, turn, goal, span), known, angles, goal, span)
-    return done if _unsteady(done, known, span) < before else None
+    if _unsteady(done, known, span) >= before or _jolts(done, clip, known, span):
+        return None
+    return done
 
 
 def _on_the_spot(clip: Clip, known: Observation, span: tuple[int, int]) -> Turn | None:
@@ -162,6 +164,16 @@ def _unsteady(clip: Clip, known: Observation, span: tuple[int, int]) -> float:
     glides = measures.glides(placed[:, pairs], placed[:, hips_of(clip.skeleton)], clip.fps, grown)
     drift = feet.drifts(clip, known, [span])[0][0]
     return max(float(glides[slice(*span)].mean()) / GLIDES, drift / (DRIFTS * grown))
+
+
+def _jolts(done: Clip, clip: Clip, known: Observation, span: tuple[int, int]) -> bool:
+    """Whether a joint's velocity jumps further at the keys beside a span than it did, and than it may: a foot
+    that is on its way there stands from there on."""
+    keys = np.array([key for key in (span[0] - 1, span[1]) if 0 < key < len(clip) - 1], int)
+    if not keys.size:
+        return False
+    before, after = (np.linalg.norm(seams.jumps(one, known, keys), axis=-1).max() for one in (clip, done))
+    return bool(after > max(before, jumps.SETS_OFF * feet.size(clip.skeleton) / clip.fps**2))
 
 
 def _steps(turn: Turn, clip: Clip, span: tuple[int, int]) -> np.ndarray | None:
