@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 from dataclasses import replace
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -239,6 +240,34 @@ def test_numbers_of_any_kind_say_frames(cmu_walk):
     assert len(forecast.clip) == len(cmu_walk) + 10
 
 
+def test_names_of_a_gap_may_stand_one_after_another(cmu_walk):
+    joints = ("LeftArm", "LeftForeArm")
+    done = interpose.fill(cmu_walk, (60, 80, *joints), method="spline")
+    assert done.report.gaps[0].joints == joints
+
+
+def test_numbers_of_any_kind_say_rates_and_joints(cmu_walk):
+    clip = replace(cmu_walk, fps=np.float32(30), translated=np.array([0]))
+    assert (clip.fps, clip.translated) == (30.0, (0,))
+    assert len(interpose.resample(clip, np.float32(60))) == 2 * len(clip) - 1
+    assert "29.97 fps" in repr(replace(cmu_walk, fps=Fraction(30000, 1001)))
+    seen = interpose.Observation.from_gaps(cmu_walk, [interpose.Gap(60, 80)])
+    hand = cmu_walk.positions()[70:71, cmu_walk.skeleton.index("LeftHand")]
+    pinned = interpose.Observation(seen.rotation, seen.translation, interpose.Pin("LeftHand", [70], hand))
+    assert interpose.fill(cmu_walk, pinned, method="spline").report.gaps[0].pins < 0.1
+
+
+def test_a_report_of_known_joints_on_a_body_that_nothing_tells_can_be_printed(cmu_walk):
+    """But for one whole pose: the body has no seams of its own, an upper body that is laid on it has."""
+    low = [name for name in cmu_walk.skeleton.names if "Leg" in name or "Foot" in name or "Toe" in name]
+    low += ["Hips", "LHipJoint", "RHipJoint", "LowerBack", "Spine", "Spine1"]
+    last = len(cmu_walk)
+    gaps = [interpose.Gap(1, 45), interpose.Gap(45, 46, tuple(low)), interpose.Gap(46, last)]
+    report = interpose.fill(cmu_walk, gaps).report
+    assert any(gap.seam_after is not None for gap in report.gaps)
+    assert f"gap 46:{last}" in str(report)
+
+
 def test_rows_of_an_array_are_gaps(cmu_walk):
     for rows in ([[20, 30], [60, 90]], [[20, 30]]):
         done = interpose.fill(cmu_walk, np.array(rows), method="linear")
@@ -279,6 +308,16 @@ def test_one_or_several_of_the_gaps_are_chosen(cmu_walk, only):
         lambda clip: interpose.recover(clip, "LeftArm", (10, 20, ["RightArm"])),
         lambda clip: interpose.scan(clip, interpose.Observation.full(clip).slice(0, 50)),
         lambda clip: interpose.Gap(10.5, 20),
+        lambda clip: interpose.Gap(20, 40, ()),
+        lambda clip: interpose.fill(clip, (60, 80, ["LeftArm"], ["LeftForeArm"])),
+        lambda clip: clip.slice(1.5, 5),
+        lambda clip: clip.joined([clip, interpose.resample(clip, 60)]),
+        lambda clip: clip.joined(
+            [replace(clip, skeleton=replace(clip.skeleton, names=clip.skeleton.names[::-1]))]
+        ),
+        lambda clip: replace(clip, translated=np.array([0.5])),
+        lambda clip: interpose.Observation(np.ones((3, 2)), np.ones((3, 2)), ("LeftHand",)),
+        lambda clip: interpose.Skeleton((), (), np.zeros((0, 3))),
         lambda clip: interpose.save(interpose.fill(clip, (60, 80), method="spline"), "x.bvh"),
         lambda clip: interpose.Clip(clip.skeleton, None, clip.translation, 30.0),
         lambda clip: replace(clip, translated=(99,)),

@@ -150,7 +150,8 @@ def fill(
             open.
         seed: for methods that sample.
         progress: called with the share done, 0 to 1.
-        parts: poses of single joints that other clips give inside of the gaps.
+        parts: poses of single joints that other clips give inside of the gaps. They count as observed, and
+            come back as they are: they are eased in and out where a gap is wider than they are.
         path: floor points (x and z in metres) that the hips are led over, by frame: {130: (1.2, 0.4)}.
         pins: where joints are to be at frames inside of gaps: Pin("LeftHand", [130], [[0.3, 1.4, 0.2]]) in
             metres, Y up. What is out of reach is met as nearly as it can be, and reported. Networks are told
@@ -536,8 +537,9 @@ def _gap(gap: Any, clip: Clip) -> Gap:
         return Gap.parse(gap, clip=clip)
     try:
         start, stop, *joints = gap
-        names = [joints[0]] if joints and isinstance(joints[0], str) else joints[0] if joints else None
-        if names is None or len(names):
+        one = joints[0] if len(joints) == 1 else joints or None
+        names = [one] if isinstance(one, str) else one
+        if names is None or (len(names) and all(isinstance(name, str) for name in names)):
             return Gap(start, stop, tuple(names) if names is not None else None)
         raise ValueError
     except (TypeError, ValueError):

@@ -5,14 +5,15 @@ Units and axes: metres, Y up, right-handed; unit quaternions (w, x, y, z); frame
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any, Protocol, SupportsIndex
 
 import numpy as np
 
-from interpose.errors import RequestError, unknown
+from interpose.errors import RequestError, unfit, unknown
 from interpose.geometry import kinematics
 from interpose.geometry.time import check_rate
 
@@ -55,6 +56,8 @@ class Skeleton:
         count = len(self.names)
         fill = object.__setattr__
         fill(self, "names", tuple(self.names))
+        if not count:
+            raise RequestError("the skeleton has no joints", "there is nothing to move", "Name one or more.")
         fill(self, "parents", tuple(int(parent) for parent in self.parents))
         fill(self, "rest_translation", np.asarray(self.rest_translation, float))
         if self.rest_translation.shape != (count, 3) or not np.isfinite(self.rest_translation).all():
@@ -149,6 +152,14 @@ class Skeleton:
 UNIT, ROUNDED = 0.01, 1e-6
 
 
+def joint_numbers(joints: Iterable[SupportsIndex]) -> tuple[int, ...]:
+    """Indices of joints, whatever kind of numbers says them; RequestError where they are none."""
+    try:
+        return tuple(operator.index(joint) for joint in joints)
+    except TypeError:
+        raise unfit("translated", joints, "indices of joints, such as (0, 5)") from None
+
+
 @dataclass(frozen=True, eq=False)
 class Clip:
     """Motion of a skeleton over time, always finite: what is missing stands in an Observation beside it.
@@ -175,8 +186,7 @@ class Clip:
 
     def __post_init__(self) -> None:
         fill = object.__setattr__
-        if not self.translated:
-            fill(self, "translated", self.skeleton.roots)
+        fill(self, "translated", joint_numbers(self.translated) or self.skeleton.roots)
         fill(self, "rotation", np.asarray(self.rotation, float))
         fill(self, "translation", np.asarray(self.translation, float))
         joints = len(self.skeleton)
@@ -206,6 +216,7 @@ class Clip:
                 "There is one, in metres, for each joint in translated: the roots, if that is left out.",
             )
         check_rate(self.fps)
+        fill(self, "fps", float(self.fps))
         if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
             raise RequestError(
                 "the clip has values that are no numbers",
@@ -261,7 +272,8 @@ class Clip:
     def slice(self, start: int, stop: int) -> Clip:
         """Frames start to stop - 1, as a clip of its own; the file's layout stays for writing.
 
-        Numbers count as in any slice: what is not there is left out, negative ones count from the end.
+        Numbers count as in any slice: what is not there is left out, negative ones count from the end. Arrays
+        are shared with this clip: clips are not changed in place (`with_motion`).
         """
         return self.take(slice(start, stop))
 
@@ -275,7 +287,7 @@ class Clip:
             chosen = np.zeros(0, int)
         try:
             index = np.arange(len(self))[chosen]
-        except IndexError:
+        except (IndexError, TypeError):
             index = np.zeros((0, 0), int)
         if index.ndim != 1:
             why = f"the clip has {len(self)} frames, counted from 0"
@@ -290,7 +302,19 @@ class Clip:
         return replace(self, rotation=rotation, translation=translation)
 
     def joined(self, clips: Sequence[Clip]) -> Clip:
-        """The motion of clips on this skeleton, one after another, with the file's layout of this one."""
+        """The motion of clips on this skeleton, one after another, with the file's layout of this one.
+
+        Raises RequestError for clips with other joints, or at another frame rate (lone poses have none).
+        """
+        for clip in clips:
+            if clip.skeleton.names != self.skeleton.names or clip.translated != self.translated:
+                why = "their joints, or those that are translated, differ"
+                raise RequestError("the clips cannot be joined", why, "Retarget one: interpose.retarget.")
+            if len(clip) > 1 and clip.fps != self.fps:
+                why = f"one has {clip.fps:g} frames a second, another {self.fps:g}"
+                raise RequestError("the clips cannot be joined", why, "Use interpose.resample first.")
+        if not clips:
+            return self.slice(0, 0)
         rotation, translation = (
             np.concatenate([getattr(clip, name) for clip in clips]) for name in ("rotation", "translation")
         )

@@ -544,6 +544,11 @@ def test_a_dry_run_checks_pins(run, take):
     assert "cannot be pinned at frame 20" in run(*words, "LeftHand@20:1,2,3").err
     assert "no frame 9000" in run(*words, "LeftHand@9000:9000000000:1,2,3").err
     assert run(*words, "LeftHand@70:1,2,3").code == 0
+    end = f"{len(load(take)) / load(take).fps}s"
+    assert (
+        run("fill", "take.bvh", "--gap", f"4s:{end}", "--dry-run", "--pin", f"LeftHand@5s:{end}:1,2,3").code
+        == 0
+    )
 
 
 @pytest.mark.parametrize("text", ["75", "75:1", "75:1,nan", "75:1,2,3", "a:1,2", "75:1,"])

@@ -322,3 +322,19 @@ def test_a_leg_bends_as_a_knee_does_to_where_its_foot_is_pinned(cmu_walk):
     foot = JOINTS.index("LeftFoot")
     off = np.degrees(rotations.angle(turned[1][:, foot], turned[0][:, foot]))
     assert off.max() < 16.0
+
+
+def test_a_joint_is_held_over_a_key_in_which_it_is_there(cmu_walk):
+    """And refused where the key has it elsewhere."""
+    hand, (start, stop) = cmu_walk.skeleton.index("LeftHand"), (GAP.start, GAP.stop)
+    turned, placed = cmu_walk.slice(start - 1, start).kinematics()
+    frames = np.arange(start - 1, start + 6)
+    rows = [np.repeat(values[:, hand], len(frames), axis=0) for values in (placed, turned)]
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[Pin("LeftHand", frames, *rows)]).clip
+    where = done.positions()[frames, hand]
+    assert np.linalg.norm(where - placed[0, hand], axis=1).max() < 1e-3
+    assert done.rotation[start - 1].tobytes() == cmu_walk.rotation[start - 1].tobytes()
+    frames = np.arange(start - 2, stop)
+    elsewhere = Pin("LeftHand", frames, np.repeat(placed[:, hand], len(frames), axis=0))
+    with pytest.raises(RequestError, match=f"cannot be pinned at frame {start - 2}"):
+        tasks.fill(cmu_walk, [GAP], "spline", pins=[elsewhere])

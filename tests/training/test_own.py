@@ -12,6 +12,7 @@ import pytest
 pytest.importorskip("torch")
 
 from interpose.cli import main
+from interpose.clip import Clip
 from interpose.datasets.own import own_pack
 from interpose.errors import FileError
 from interpose.formats import load, save
@@ -122,3 +123,13 @@ def test_weights_that_are_there_are_not_replaced(tmp_path, capsys):
     assert main(["export", "base", "--run", str(run), "--out", str(out)]) == 3
     assert "--force" in capsys.readouterr().err
     assert (out / "small.onnx").read_text() == "trained for hours"
+
+
+def test_takes_of_one_rig_may_move_different_joints(takes):
+    """As two programs export them: the root alone, or positions of every joint."""
+    clip = load(takes / "a.bvh")
+    everything = tuple(range(len(clip.skeleton)))
+    save(Clip(clip.skeleton, clip.rotation, clip.local_translation(), clip.fps, everything), takes / "b.bvh")
+    pack = own_pack(takes, 56)
+    assert len(pack.splits) == 6
+    assert np.allclose(pack.bones[0], pack.bones[2], atol=1e-4)

@@ -239,8 +239,9 @@ def range_of(text: str, clip: Clip, joints: tuple[str, ...] | None = None) -> Ga
 FRAME = r"\d+|\d*\.?\d+s"  # a frame, or a time in seconds
 
 
-def frame_of(text: str, clip: Clip) -> int:
-    """A frame from "140", or the one nearest to "3.5s". RequestError for what is none, or is not there."""
+def frame_of(text: str, clip: Clip, end: bool = False) -> int:
+    """A frame from "140", or the one nearest to "3.5s"; or the `end` of a range, which may be the one after
+    the last. RequestError for what is none, or is not there."""
     try:
         frame = frame_at(text, clip.fps) if re.fullmatch(FRAME, text) else None
     except ValueError:  # hundreds of digits
@@ -248,7 +249,7 @@ def frame_of(text: str, clip: Clip) -> int:
     if frame is None:
         why = "it is a number of a frame, counted from 0, or a time in seconds"
         raise RequestError(f"cannot read the frame {text}", why, "Write 140, or 3.5s.")
-    if frame >= len(clip):
+    if frame >= len(clip) + end:
         why = f"the clip has {len(clip)} frames, counted from 0"
         raise RequestError(f"there is no frame {text}", why, f"Choose one of 0 to {len(clip) - 1}.")
     return frame
@@ -277,11 +278,6 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
     return points
 
 
-def _until(text: str, clip: Clip) -> int:
-    """The frame that a range ends before, which may be the one after the last."""
-    return len(clip) if text == str(len(clip)) else frame_of(text, clip)
-
-
 def pins_of(texts: list[str], clip: Clip, gaps: list[Gap]) -> list[Pin]:
     """Pins "JOINT@FRAME:X,Y,Z" or "JOINT@START:STOP:X,Y,Z" of --pin, in the file's own unit and axes; or with
     "@FRAME" for the place, which is known in spite of the gaps: there, and turned as it is then."""
@@ -298,7 +294,7 @@ def pins_of(texts: list[str], clip: Clip, gaps: list[Gap]) -> list[Pin]:
         except ValueError:
             where = np.array([np.nan])
         start = frame_of(match[2], clip) if match else 0
-        stop = _until(match[3], clip) if match and match[3] else start + 1
+        stop = frame_of(match[3], clip, end=True) if match and match[3] else start + 1
         if match is None or not np.abs(where).max() <= VALUE_LIMIT or stop <= start:
             raise RequestError(
                 f"cannot read --pin {text}",

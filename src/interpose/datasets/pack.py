@@ -157,7 +157,11 @@ def _rests(chosen: Sequence[Part]) -> Iterator[tuple[str, Rest]]:
     for performer in {part.performer for part in chosen}:
         own = [part.clip for part in chosen if part.performer == performer]
         first, total = own[0], sum(map(len, own))
-        alike = [clip for clip in own if clip.skeleton.names == first.skeleton.names]
+        alike = [
+            clip
+            for clip in own
+            if clip.skeleton.names == first.skeleton.names and clip.translated == first.translated
+        ]
         step = max(1, total // POOL)
         pool = replace(
             first,

@@ -178,8 +178,9 @@ def _pinned(
     clip: Clip, observation: Observation, ask: Ask, path: Mapping[int, np.ndarray] | None
 ) -> Completion:
     """Complete a clip, bring what is pinned to its place, and make the result usable once more."""
-    pins.check(clip, observation)
-    asked, free = pins.merged(observation.pins), replace(observation, pins=())
+    asked, free = pins.asked(clip, observation), replace(observation, pins=())
+    if not asked:
+        return _complete(clip, free, ask, path)
     known = certain(clip, free)
     unled = _complete(clip, free, ask, path)
     # A network that is told of one frame changes that frame: it is told the whole way there and back.
@@ -232,7 +233,7 @@ def _told_of(body: Completion, done: Completion, but: tuple[str, ...] = ()) -> C
         kept = [note for note in kept if note not in (*but, *gap.notes)]
         return replace(
             gap,
-            seam_before=one.seam_before,
+            seam_before=gap.seam_before if one.seam_before is None else one.seam_before,
             foot_slide_before=one.foot_slide_before,
             solve_error=one.solve_error,
             notes=(*kept, *gap.notes),

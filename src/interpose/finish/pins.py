@@ -29,6 +29,8 @@ SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
 # How many square metres a radian counts, beside another joint's place, by which a knee or an elbow turns
 # otherwise than it bends: thighs and upper arms turn instead. From 1 on elbows jump that a hand brings near.
 HINGED = 0.3
+# Radians by which a joint that is known to be turned is turned otherwise than a pin says.
+TURNED = 0.01
 # Seconds over which a joint slows down to a place that it is to hold while the body goes on.
 LEAD = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
@@ -41,9 +43,13 @@ AT_MOST = 20
 STEADY, TOGETHER = 1.0, 2000
 
 
-def check(clip: Clip, observation: Observation) -> None:
-    """Raise RequestError for pins of joints or frames that are not there, of values that are known already,
-    or that say nothing."""
+def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
+    """What pins ask for, `merged`: a joint that is held over a key is known there, as it is to be.
+
+    Raises RequestError for pins of joints or frames that are not there, of values that are known and other
+    ones, or that say nothing.
+    """
+    found: list[Pin] = []
     placed = observation.positions(clip.skeleton)
     turned = _turned(clip.skeleton, observation)
     for pin in observation.pins:
@@ -88,15 +94,27 @@ def check(clip: Clip, observation: Observation) -> None:
                 "a quaternion of it is zero",
                 "No turn is 1, 0, 0, 0.",
             )
-        known = (pin.position is not None) & placed[frames, joint]
         # It is the joint itself that turns.
-        known |= (pin.orientation is not None) & (turned | observation.rotation)[frames, joint]
-        if known.any():
-            raise RequestError(
-                f"{pin.joint} cannot be pinned at frame {frames[known][0]}",
-                "where it is, or how it is turned, follows from what is observed, which comes back unchanged",
-                "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
-            )
+        known = {"position": placed, "orientation": turned | observation.rotation}
+        here = clip.take(frames).kinematics()
+        for kind, seen in known.items():
+            if (values := getattr(pin, kind)) is None:
+                continue
+            told = seen[frames, joint]
+            if kind == "position":
+                other = np.linalg.norm(here[1][:, joint] - values, axis=1) > pin.tolerance
+            else:
+                other = rotations.angle(here[0][:, joint], rotations.normalize(np.asarray(values))) > TURNED
+            if (wrong := told & other).any():
+                raise RequestError(
+                    f"{pin.joint} cannot be pinned at frame {frames[wrong][0]}",
+                    "where it is, or how it is turned, follows from what is observed, which comes back "
+                    "unchanged",
+                    "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
+                )
+            if not told.all():
+                rows = np.asarray(values)[~told]
+                found.append(Pin(pin.joint, frames[~told], tolerance=pin.tolerance, **{kind: rows}))
     places: dict[tuple[str, int], np.ndarray] = {}
     for pin in observation.pins:
         for frame, place in zip(pin.frames, () if pin.position is None else pin.position):
@@ -107,6 +125,7 @@ def check(clip: Clip, observation: Observation) -> None:
                     f"they are {100 * apart:.1f} cm apart, and it can be at one of them",
                     "Leave one of the pins out.",
                 )
+    return merged(found)
 
 
 def merged(pins: Iterable[Pin]) -> tuple[Pin, ...]:
@@ -135,7 +154,7 @@ def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
     Args:
         clip: (F) complete.
         known: what may not be changed.
-        pins: as `check` lets them pass, `merged`.
+        pins: as `asked`.
     """
     for (start, stop), (lo, hi), edges in _gaps(known):
         if some := [one for pin in pins if len((one := pin.slice(lo, hi)).frames)]:

@@ -20,7 +20,7 @@ from interpose.observation import Gap
 class Provenance(IntEnum):
     """Where a joint's values in a frame come from."""
 
-    OBSERVED = 0
+    OBSERVED = 0  # of this clip, or of another one that parts come from
     METHOD = 1  # what the method said (solved, where it speaks positions)
     CORRECTED = 2  # the method's, changed by seams or feet
     FALLBACK = 3  # the simpler method's
@@ -100,7 +100,8 @@ class GapReport:
             parts.append(f"solved within {self.solve_error:.2f} cm")
         if self.seam_after is not None:
             above = f" (limit {self.seam_limit:.2f})" if self.seam_limit is not None else ""
-            parts.append(f"seam {self.seam_before:.2f} -> {self.seam_after:.2f}{above} cm/frame^2")
+            before = "" if self.seam_before is None else f"{self.seam_before:.2f} -> "
+            parts.append(f"seam {before}{self.seam_after:.2f}{above} cm/frame^2")
         if self.peak is not None:
             above = f" (limit {self.peak_limit:.2f})" if self.peak_limit is not None else ""
             parts.append(f"inside at most {self.peak:.2f}{above}")

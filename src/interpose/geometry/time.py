@@ -227,6 +227,7 @@ def resample(clip: Clip, fps: float, smooth: bool = False) -> Clip:
     if not hasattr(clip, "with_motion"):
         raise unfit("clip", clip, "a clip: interpose.load reads one")
     check_rate(fps)
+    fps = float(fps)
     if not len(clip):
         return replace(clip, fps=fps)
     # Files round the frame time (0.033333 s): rates that are that close to a simple ratio mean it, or else

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from interpose.clip import Clip, Skeleton
+from interpose.clip import Clip, Skeleton, joint_numbers
 from interpose.errors import RequestError, is_number, unfit
 
 
@@ -39,6 +39,12 @@ class Gap:
             object.__setattr__(self, side, frame_number(getattr(self, side)))
         if self.joints is not None:
             object.__setattr__(self, "joints", joint_names(self.joints))
+            if not self.joints:
+                raise RequestError(
+                    f"nothing is missing in the gap {self.start}:{self.stop}",
+                    "it names no joints",
+                    "Name some, or leave them out for the whole pose.",
+                )
 
     def __len__(self) -> int:
         return self.stop - self.start
@@ -192,6 +198,9 @@ class Observation:
         fill = object.__setattr__
         fill(self, "rotation", _flags(self.rotation))
         fill(self, "translation", _flags(self.translation))
+        fill(self, "pins", (self.pins,) if isinstance(self.pins, Pin) else tuple(self.pins))
+        if wrong := [pin for pin in self.pins if not isinstance(pin, Pin)]:
+            raise unfit("pins", wrong[0], "Pins")
         if self.rotation.shape != self.translation.shape or self.rotation.ndim != 2:
             raise RequestError(
                 "the observation does not fit",
@@ -253,7 +262,7 @@ class Observation:
         rotation: (F, J, 4); translation: (F, K, 3) as in Clip. A quaternion, or a vector, with a NaN in it is
         missing as a whole: of a place of which two coordinates are known nothing is.
         """
-        translated = translated or skeleton.roots
+        translated = joint_numbers(translated) or skeleton.roots
         rotation, translation = np.array(rotation, float), np.array(translation, float)
         if not all(0 <= joint < len(skeleton) for joint in translated):
             raise RequestError(

@@ -38,7 +38,7 @@ def plan(
     temperature: float = 1.0,
 ) -> list[Job]:
     """The runs of incomplete frames, numbered in order of time, each with its method; pins are checked."""
-    pinning.check(clip, observation)
+    pinning.asked(clip, observation)
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
     wanted = (
         range(1, len(spans) + 1) if only is None else list(only) if isinstance(only, Iterable) else [only]
