@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 import textwrap
@@ -11,17 +12,18 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import under_root
 
 from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
-from interpose.finish import complete, feet
+from interpose.finish import complete, feet, retarget
 from interpose.finish.report import GapReport
 from interpose.formats import load
 from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
-from interpose.methods import registry, weights
+from interpose.methods import base, registry, weights
 from interpose.observation import Gap, Observation, timeline
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
@@ -767,3 +769,84 @@ def test_another_body_in_the_same_file_is_said_to_be_interpolated(cmu_walk):
     )
     (gap,) = tasks.fill(cmu_walk, [Gap(60, 90)], "small").report.gaps
     assert not any("another body" in note for note in gap.notes)
+
+
+def test_a_root_that_stays_does_so_where_a_pose_of_another_body_is_met(cmu_walk):
+    """What follows the pose is moved with it: by its hips, not by what stays at the origin."""
+    large = replace(cmu_walk.skeleton, rest_translation=1.3 * cmu_walk.skeleton.rest_translation)
+    other = under_root(replace(cmu_walk, skeleton=large, translation=1.3 * cmu_walk.translation), False)
+    done = tasks.pose_to_pose(
+        under_root(cmu_walk, False).slice(0, 101), other.slice(120, 208), 30, method="spline"
+    ).clip
+    assert np.ptp(done.positions()[:, 0], axis=0).max() < 1e-9
+    made = blocked(under_root(cmu_walk, False), 100, other, 120, {}, 30).clip.positions()
+    hips = find_humanoid(other).mapping["Hips"]
+    assert np.linalg.norm(np.diff(made[-15:, hips], axis=0), axis=-1).max() < 0.1
+
+
+def test_a_rest_pose_beside_a_pose_does_not_say_how_long_the_way_takes(cmu_walk):
+    walk = cmu_walk.slice(1, 101)
+    aside = walk.with_motion(walk.rotation, walk.translation + np.array([6.0, 0.0, 0.0]))
+    rest = walk.with_motion(
+        np.tile(walk.skeleton.rest_rotation, (100, 1, 1)), np.zeros_like(walk.translation)
+    )
+    led = walk.joined([rest.slice(0, 1), aside])
+    one, other = (blocked(walk, 99, target, first, {}, None).said for target, first in ((aside, 0), (led, 1)))
+    assert one == other
+    assert int(one[0].split()[0]) > 100
+    assert one[0] in tasks.pose_to_pose(walk, led, method="spline").report.gaps[-1].notes
+
+
+def test_folders_name_methods_by_text(cmu_walk):
+    folder = weights.find("small").onnx.parent
+    report = tasks.fill(cmu_walk, [Gap(60, 80)], folder).report
+    assert report.gaps[0].method == str(folder)
+    assert json.dumps(report.to_dict())
+
+
+def test_numbers_of_gaps_count_what_was_observed(cmu_walk):
+    """A forearm that is lost for a moment is the first of two gaps, and stays open with `only` the other."""
+    seen = Observation.from_gaps(cmu_walk, [Gap(60, 100)])
+    arm = cmu_walk.skeleton.index("LeftForeArm")
+    seen.rotation[20:23, arm] = False
+    report = tasks.fill(cmu_walk, seen, "spline", only=[2]).report
+    assert [(gap.start, gap.stop) for gap in report.gaps] == [(60, 100)]
+    assert [(gap.start, gap.stop) for gap in report.open] == [(20, 23)]
+
+
+def test_lengths_are_tried_with_the_clips_beside_a_gap_alone(cmu_walk, monkeypatch):
+    """A clip of ten frames does not reach over the gap before it."""
+    seen, lay = [], timeline.lay
+
+    def watched(clips, *args, **kwargs):
+        seen.append([len(clip) for clip in clips])
+        return lay(clips, *args, **kwargs)
+
+    monkeypatch.setattr(timeline, "lay", watched)
+    parts = [cmu_walk.slice(0, 60), cmu_walk.slice(100, 110), cmu_walk.slice(120, 200)]
+    tasks.stitch(parts, method="spline")
+    assert len(seen) > 3
+    assert all(10 in lengths for lengths in seen if lengths != [60, 10, 80])
+
+
+def test_nothing_retargeted_is_nothing(cmu_walk):
+    large = replace(cmu_walk.skeleton, rest_translation=1.3 * cmu_walk.skeleton.rest_translation)
+    assert len(retarget(replace(cmu_walk, skeleton=large).slice(0, 0), cmu_walk)) == 0
+
+
+def test_the_beginning_of_a_clip_is_said_as_firmly_as_its_end(cmu_walk, monkeypatch):
+    """Of fewer frames than what is near to known ones: a slice that ended before it began was taken from the
+    end of the clip."""
+    guessed = []
+
+    class Watched(np.ndarray):
+        def __setitem__(self, key, value):
+            super().__setitem__(key, value)
+            if isinstance(value, float) and value == base.GUESSED:
+                guessed.append(self[key].size)
+
+    ones = np.ones
+    monkeypatch.setattr(base.np, "ones", lambda *args, **kwargs: ones(*args, **kwargs).view(Watched))
+    for gap in (Gap(0, 25), Gap(len(cmu_walk) - 25, len(cmu_walk))):
+        tasks.fill(cmu_walk, [gap], "small")
+    assert set(guessed) == {0}

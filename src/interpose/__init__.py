@@ -335,7 +335,8 @@ def pose_to_pose(
         start, target: clips, or paths; `clip.slice(0, 81)` is one that ends with frame 80, and
             `clip.slice(12, 13)` a pose alone. What lies before the first pose and after the last one tells
             how the body leaves and meets them. What is of another rig than `start` is retargeted.
-        frames: how many to generate between the two, or "1.5s"; "auto" chooses what is unhurried.
+        frames: how many to generate between the two, or "1.5s"; "auto" chooses what is unhurried, and the
+            report says why.
         anchors: poses to be met on the way, by frame: the first of each clip. `start`'s is frame 0.
         action: what the motion is, as in `between`.
         method, seed, progress, path, pins: as in `fill`; frames count from `start`'s pose, which is 0.

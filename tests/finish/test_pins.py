@@ -338,3 +338,15 @@ def test_a_joint_is_held_over_a_key_in_which_it_is_there(cmu_walk):
     elsewhere = Pin("LeftHand", frames, np.repeat(placed[:, hand], len(frames), axis=0))
     with pytest.raises(RequestError, match=f"cannot be pinned at frame {start - 2}"):
         tasks.fill(cmu_walk, [GAP], "spline", pins=[elsewhere])
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.4, 0.0), (0.0, 0.3, 0.2)])
+def test_a_hand_that_is_held_high_does_not_lift_the_feet_off_the_floor(cmu_walk, off):
+    """A network that is told of it lifts the whole body: by two centimetres and more."""
+    frames, hand = np.arange(95, 115), cmu_walk.skeleton.index("LeftHand")
+    place = np.tile(cmu_walk.positions()[100, hand] + off, (len(frames), 1))
+    free = tasks.fill(cmu_walk, [Gap(70, 140)])
+    held = tasks.fill(cmu_walk, [Gap(70, 140)], pins=[Pin("LeftHand", frames, place)])
+    higher = (held.clip.positions() - free.clip.positions())[:, feet.ends(cmu_walk.skeleton), 1]
+    assert higher.max() < 0.006
+    assert held.report.gaps[0].pins < 0.1

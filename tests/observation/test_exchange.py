@@ -308,6 +308,34 @@ def test_legs_with_axes_of_their_own_are_put_back(trial):
     assert exchanges(trial) == []
 
 
+def test_arms_with_axes_of_their_own_that_stay_exchanged_are_put_back_but_for_their_fingers(cmu_walk):
+    """As on rigs of games; nothing tells where fingers pointed."""
+    skeleton, rest = cmu_walk.skeleton, cmu_walk.skeleton.rest_rotation.copy()
+    rotation, bones = cmu_walk.rotation.copy(), skeleton.rest_translation.copy()
+    half = rotations.about("X", np.array(np.pi))
+    top = skeleton.index("RightShoulder")
+    for joint in np.flatnonzero(skeleton.below[:, top]).tolist():
+        inner = joint != top
+        for values in (rest[joint : joint + 1], rotation[:, joint]):
+            values[:] = rotations.multiply(values, half)
+            if inner:
+                values[:] = rotations.multiply(rotations.conjugate(half), values)
+        if inner:
+            rest[joint] = [1.0, 0, 0, 0]
+            bones[joint] = rotations.rotate(rotations.conjugate(half), bones[joint])
+    rig = Clip(
+        replace(skeleton, rest_translation=bones, rest_rotation=rest), rotation, cmu_walk.translation, 30
+    )
+    assert np.allclose(rig.positions(), cmu_walk.positions())
+    rows = [row for row, name in enumerate(JOINTS) if name.endswith(("Shoulder", "Arm", "ForeArm", "Hand"))]
+    odd = crossed(rig, rows, 100, len(rig))
+    done = tasks.recover(odd, frames=(100, len(rig)))
+    arms = [skeleton.index(JOINTS[row]) for row in rows]
+    assert np.allclose(done.clip.positions()[:, arms], rig.positions()[:, arms], atol=1e-6)
+    fingers = skeleton.index("LThumb")
+    assert (done.clip.rotation[:, fingers] == odd.rotation[:, fingers]).all()
+
+
 def test_exchanged_values_are_not_taken_for_exchanged_limbs(trial):
     """Where axes differ that is something else: put back as limbs they would be half a metre off."""
     names = ["femur", "tibia", "foot", "toes"]

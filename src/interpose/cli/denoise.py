@@ -75,7 +75,7 @@ def denoise(
         done = tasks.denoise(clip, strength, chosen, span, method, seed)
     more = {"dry_run": True} if dry_run else {}
     more["denoised"] = done.report.to_dict()["denoised"]
-    report = to_json("denoise", file, outputs.clip, clip, done, None, {}, more)
+    report = to_json("denoise", file, outputs.clip, clip, done, seed, {}, more)
     report["units"] = UNITS
     notes = [] if dry_run else write(outputs, force, clip, done, report)
     if json:

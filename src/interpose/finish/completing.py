@@ -187,7 +187,7 @@ def _pinned(
     ways = pins.ways(unled.clip, known, asked)
     told = _Told(ask.method.name, ask.method, ways)
     body = _complete(clip, free, replace(ask, method=told), path) if ways else unled
-    met = pins.meet(body.clip, known, asked)
+    met = pins.meet(body.clip, known, asked, pins.hovering(body.clip, known, unled.clip))
     layer = Layer(ask.method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
     done = _told_of(body, _complete(clip, free, replace(ask, method=layer, fallback=layer), None))
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]

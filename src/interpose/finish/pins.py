@@ -17,6 +17,7 @@ from interpose.errors import RequestError, is_number
 from interpose.finish import feet
 from interpose.finish.hinges import Hinges
 from interpose.finish.solve import BLOCK, refine, refine_steadily
+from interpose.finish.windows import envelope, spread
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.methods.bodies import no_humanoid
@@ -148,17 +149,20 @@ def merged(pins: Iterable[Pin]) -> tuple[Pin, ...]:
     )
 
 
-def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> Clip:
+def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...], down: np.ndarray | None = None) -> Clip:
     """The clip with its pins met, as far as its bones reach.
 
     Args:
         clip: (F) complete.
         known: what may not be changed.
         pins: as `asked`.
+        down: (F, n) metres by which `feet.ends` are to be lower, as far as pins are met nevertheless.
     """
+    if down is None:
+        down = np.zeros((len(clip), len(feet.ends(clip.skeleton))))
     for (start, stop), (lo, hi), edges in _gaps(known):
         if some := [one for pin in pins if len((one := pin.slice(lo, hi)).frames)]:
-            part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges)
+            part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges, down[lo:hi])
             rotation, translation = clip.rotation.copy(), clip.translation.copy()
             rotation[start:stop] = part.rotation[start - lo : stop - lo]
             translation[start:stop] = part.translation[start - lo : stop - lo]
@@ -200,19 +204,43 @@ def _gaps(known: Observation) -> Iterator[tuple[tuple[int, int], tuple[int, int]
         yield (start, stop), (lo, hi), [frame - lo for frame in (start - 1, stop) if lo <= frame < hi]
 
 
-def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) -> Clip:
+def hovering(clip: Clip, known: Observation, standing: Clip) -> np.ndarray:
+    """(F, n) metres by which `feet.ends` are higher than in another motion, where they stand in that.
+
+    A network that is told where a hand is to be lifts the whole body a little, both feet off the floor.
+    """
+    ends, pairs, grown = feet.ends(clip.skeleton), feet.pairs(clip.skeleton), feet.size(clip.skeleton)
+    high = np.zeros((len(clip), len(ends)))
+    if not ends:
+        return high
+    placed, seen = standing.positions() / grown, known.positions(clip.skeleton)
+    floors = feet.local_floor(placed[:, pairs], seen[:, pairs], clip.fps).reshape(len(clip), -1)
+    floor = floors[:, [pairs.ravel().tolist().index(end) for end in ends]]
+    stands = feet.contacts(placed[:, ends], floor, clip.fps) & ~seen[:, ends]
+    off = np.where(stands, clip.positions()[:, ends, 1] - grown * placed[:, ends, 1], 0.0)
+    for start, stop in runs(~known.frames):
+        inside = np.zeros(len(clip), bool)
+        inside[start:stop] = True
+        fade = np.prod(envelope(inside, over := max(2.0, LEAD * clip.fps)), axis=0)
+        for row, column in enumerate(off.T):
+            high[:, row] += fade * spread(np.where(inside, np.maximum(column, 0.0), 0.0), over)
+    return high
+
+
+def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray) -> Clip:
     placed = [pin for pin in pins if pin.position is not None]
     turned = [pin for pin in pins if pin.orientation is not None]
     # Turning a joint moves what hangs on it, so where both are asked for both are done twice.
     for _ in range(2 if placed and turned else 1):
         if placed:
-            clip = _place(clip, known, placed, edges)
+            clip = _place(clip, known, placed, edges, down)
+            down = np.zeros_like(down)
         for pin in turned:
             clip = _turn(clip, known, pin, edges)
     return clip
 
 
-def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) -> Clip:
+def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray) -> Clip:
     """Bring joints to their places by turning all that is free, frame by frame."""
     skeleton = clip.skeleton
     pinned = [skeleton.index(pin.joint) for pin in pins]
@@ -232,6 +260,13 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int]) ->
         other = along.get(joint, joint)
         if other not in pinned and other in joints:
             wanted[:, joints.index(other)] += change
+    # The body comes down with its feet; not what is pinned, nor a foot that goes along with that.
+    lower = dict(zip(feet.ends(skeleton), down.T))
+    for row, joint in enumerate(joints):
+        if not {joint, along.get(joint)} & {*pinned}:
+            by = lower.get(joint, down.max(axis=1, initial=0.0))
+            wanted[:, row, 1] -= by
+            off[:, row] += by
     moved = np.flatnonzero(off.max(axis=1) > 1e-6)
     if not moved.size:
         return clip

@@ -446,7 +446,8 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
     step, last_step = steps(known, closed, sight)
     in_turn, sure = closed and whole, np.ones(frames)
     if whole:
-        sure[begin + FIRM * (begin > 0) : end - FIRM * (end < frames)] = GUESSED
+        near, far = begin + FIRM * (begin > 0), end - FIRM * (end < frames)
+        sure[near : max(near, far)] = GUESSED
     astray, backwards = in_turn and end - begin > ASTRAY, begin == 0 and end < frames
     # A body whose hips are known gets nowhere: limbs that hang from it are off by no more and more.
     errors = _Errors(done.expected, closed, not motion.known[begin:end, [0, -1]].all())

@@ -6,7 +6,7 @@ from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from os import PathLike
+from os import PathLike, fspath
 from pathlib import Path
 from typing import Any, cast
 
@@ -65,6 +65,7 @@ def get(name: str | Method) -> Method:
                 "Give a name, or an object as interpose.methods.protocol.Method says.",
             )
         return name
+    name = fspath(name)
     if name in METHODS or name in _offered():
         return _named(name)
     if not (name and Path(name).is_dir()):

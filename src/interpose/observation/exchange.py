@@ -79,7 +79,7 @@ class Crossing(Exchange):
     """The same of joints whose axes are not alike on both sides, as in .asf files and on many rigs of games:
     each points where the other one did."""
 
-    body: Humanoid | None = field(default=None, compare=False, repr=False)  # of the whole clip
+    body: Humanoid = field(compare=False, repr=False, kw_only=True)  # of the whole clip
 
     # Of 150 clips, 54,000 frames, none has one. Lines of an .amc file that were exchanged, which is another
     # thing, have shares of .5 at both ends, and what is one .03.
@@ -88,7 +88,7 @@ class Crossing(Exchange):
 
     def undone(self, clip: Clip) -> np.ndarray:
         """The rotations of a clip (F, J, 4) with both on the other side."""
-        body = self.body or find_humanoid(clip)
+        body = self.body
         rows = {joint: row for row, joint in zip(*body.mapping.mapped)}
         here, there = (
             [rows[joint] for joint in some] for some in (self.left + self.right, self.right + self.left)
@@ -175,10 +175,7 @@ def exchanges(clip: Clip) -> list[Taken]:
     time; none of what is no humanoid."""
     mapping, found = find_mapping(clip.skeleton), list[Taken]()
     for sides in _sides(clip):
-        spells: list[Exchange] = [_whole(clip, one) for one in _cuts(clip, sides)[0]]
-        if not spells and (crossing := _crossing(clip, sides)) is not None:
-            spells += _cuts(clip, crossing)[0]
-        found += spells
+        found += [_whole(clip, one) for one in _changes(clip, sides)[1]]
     for limb in LIMBS:
         own = [mapping.joints[row] for row in limb]
         # Of an arm it is the collar that comes first.
@@ -236,12 +233,10 @@ def crossovers(clip: Clip) -> list[Exchange]:
     found, every = [], _sides(clip)
     cut = _torn(clip, every) if every else {*()}
     for sides in every:
-        cuts = [*_cuts(clip, sides)[1], len(clip)]
-        if len(cuts) == 1 and (crossing := _crossing(clip, sides)) is not None:
-            sides, cuts = crossing, [*_cuts(clip, crossing)[1], len(clip)]
-        cuts = [frame for frame in cuts if frame not in cut]
+        kind, _, lone = _changes(clip, sides)
+        cuts = [frame for frame in (*lone, len(clip)) if frame not in cut]
         found += [
-            _whole(clip, replace(sides, start=start, stop=stop))
+            _whole(clip, replace(kind, start=start, stop=stop))
             for start, stop in zip(cuts[:-1:2], cuts[1::2])
         ]
     return sorted(found, key=lambda one: (one.start, one.joints))
@@ -269,6 +264,15 @@ def _sides(clip: Clip) -> list[Exchange]:
         if JOINTS[limb[0]].startswith("Left") and both:
             found.append(Exchange(0, 0, *zip(*both)))
     return found
+
+
+def _changes(clip: Clip, sides: Exchange) -> tuple[Exchange, list[Exchange], list[int]]:
+    """In which way joints change sides, as they do by their axes or by where they point; the spells in which
+    they do, and the frames in which they do and not back."""
+    spells, lone = _cuts(clip, sides)
+    if not spells and not lone and (crossing := _crossing(clip, sides)) is not None:
+        return (crossing, *_cuts(clip, crossing))
+    return sides, spells, lone
 
 
 def _crossing(clip: Clip, sides: Exchange) -> Crossing | None:
@@ -302,14 +306,18 @@ def _whole(clip: Clip, one: Exchange) -> Exchange:
 
     All of it changed sides, or none, as where only the canonical joints went through a network: whichever
     turns less at both ends. That is right in 480 of 480 exchanges of arms in 16 clips with fingers, which are
-    exchanged, too, in half of them.
+    exchanged, too, in half of them. Where axes are not alike on both sides nothing tells where those point.
     """
     like = counterparts(clip.skeleton)
     left, right = (
         set(np.flatnonzero(clip.skeleton.below[:, side].any(axis=1)).tolist()) - set(side)
         for side in (one.left, one.right)
     )
-    mine = tuple(joint for joint in sorted(left) if like[joint] in right and like[like[joint]] == joint)
+    mine = tuple(
+        joint
+        for joint in sorted(left)
+        if like[joint] in right and like[like[joint]] == joint and not isinstance(one, Crossing)
+    )
     theirs = tuple(like[joint] for joint in mine)
     turning = np.ptp(rotations.continuous(clip.rotation), axis=0).max(axis=-1) > LIFELESS
     alone = sorted(joint for joint in (left | right) - {*mine, *theirs} if turning[joint])

@@ -16,7 +16,7 @@ from interpose.observation.splined import splined
 from interpose.observation.steps import STILL, Run, Steps, zero_runs
 from interpose.observation.stiff import PACE, even, held, held_place
 from interpose.skeletons import SIDES, find_mapping
-from interpose.skeletons.carrier import hips_of, line_of, placed
+from interpose.skeletons.carrier import hips_of, line_of, place_of, placed
 
 # A joint that turns less than this in the whole clip (radians) has no data at all, like most fingers.
 LIFELESS = 1e-3
@@ -45,6 +45,17 @@ def stuck(clip: Clip) -> list[Finding]:
     found = frozen(Steps.of(clip), [])
     lost = [one for one in found if one.kind in STUCK]
     return but_whole(lost, held_or_led(clip, found)) if lost else []
+
+
+def held_values(clip: Clip, one: Finding) -> tuple[list[int], list[int]]:
+    """The joints that do not turn in something frozen, and those whose place stands still: of a body all that
+    says where it is."""
+    joints = [*range(len(clip.skeleton))] if one.joints is None else [*map(clip.skeleton.index, one.joints)]
+    if one.kind == "frozen body":
+        return joints, line_of(clip)
+    if one.kind == "frozen position":
+        return [], [*joints, place_of(clip)] if {*joints} & {*line_of(clip)} else joints
+    return joints, joints if one.joints is None else []
 
 
 def frozen(steps: Steps, findings: list[Finding]) -> list[Finding]:

@@ -58,7 +58,7 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
             assert hips is not None
             for joint in {hips, *mine.ancestors(hips)} & set(like.translated):
                 column = like.translated.index(joint)
-                pivot = translation[0, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
+                pivot = translation[:1, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
                 translation[:, column] = pivot + scale * (translation[:, column] - pivot)
     fitted = replace(
         like, rotation=clip.rotation[:, order], translation=translation, name=clip.name, source=clip.source

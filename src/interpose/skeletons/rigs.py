@@ -23,7 +23,7 @@ LIKE = 0.98  # the cosine by which bones of a zero pose may point elsewhere
 
 @cache
 def _rigs() -> list[dict[str, Any]]:
-    return json.loads(RIGS.read_text()) if RIGS.exists() else []
+    return json.loads(RIGS.read_text())
 
 
 def directions(skeleton: Skeleton) -> np.ndarray:

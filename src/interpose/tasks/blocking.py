@@ -15,7 +15,7 @@ from interpose.observation import Pin
 from interpose.observation.observation import frame_number
 from interpose.observation.scan import strays
 from interpose.observation.timeline import Placement, bounded, plausible_length
-from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.carrier import carriers, hips_of
 from interpose.skeletons.fitting import fit
 from interpose.tasks.keys import between, block
 from interpose.tasks.stitching import BESIDE
@@ -65,7 +65,7 @@ def pose_to_pose(
 
     Args:
         start, target: the clips; what lies before the one pose and after the other tells how the body moves.
-        frames: how many lie between the two; None for as many as the way takes.
+        frames: how many lie between the two; None for as many as the way takes, and the report says why.
         anchors: clips whose first pose is met so many frames after the first one.
         action, method, seed, progress: as in `between`.
         path, pins: as in `fill`; their frames count from the first pose on, which is 0.
@@ -93,7 +93,10 @@ def pose_to_pose(
     zero = laid.keys[0]
     points = {zero + frame_number(frame): point for frame, point in (path or {}).items()}
     later = [replace(pin, frames=zero + np.asarray(pin.frames)) for pin in pins]
-    return between(laid.clip, laid.keys, action, method, seed, progress, True, points, later)
+    done = between(laid.clip, laid.keys, action, method, seed, progress, True, points, later)
+    gaps = done.report.gaps
+    told = [*gaps[:-1], *(replace(gap, notes=(*laid.said, *gap.notes)) for gap in gaps[-1:])]
+    return replace(done, report=replace(done.report, gaps=told))
 
 
 def blocked(
@@ -116,6 +119,13 @@ def blocked(
     met, end = max(poses), fit(after.slice(first, first + 1), held)[0]
     beside = fit(after, before)[0]
     moment = min(round(first * before.fps / after.fps), len(beside) - 1)
+    # Rest poses and the like at the ends of clips tell nothing of how it moves.
+    (before, last), (beside, moment) = _sound(before, last), _sound(beside, moment)
+    # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
+    hips = hips_of(held.skeleton)
+    off = end.positions()[0, hips] - beside.slice(moment, moment + 1).positions()[0, hips]
+    there = Placement(shift=(float(off[0]), 0.0, float(off[2])))
+    beside = there.of(beside, carriers(beside))
     said: tuple[str, ...] = ()
     if frames is None:
         # On to the target from the last pose before it; when anchors are met was said.
@@ -130,18 +140,20 @@ def blocked(
         raise RequestError(f"cannot meet an anchor @{met}", why, f"Choose a frame from 1 to {frames}.")
     poses[frames + 1] = end
     near, laid = round(BESIDE * before.fps), block(poses)
-    # Rest poses and the like at the ends of clips tell nothing of how it moves.
-    since = max([0, last - near, *(stray + 1 for stray in strays(before) if stray < last)])
-    until = min([moment + 1 + near, len(beside), *(stray for stray in strays(beside) if stray > moment)])
-    # Nor does another pose beside one that is blocked.
+    since, until = max(0, last - near), min(moment + 1 + near, len(beside))
+    # Another pose beside one that is blocked tells nothing of it either.
     since = since if since < last and _goes_on(before.slice(last - 1, last + 1)) else last
     until = until if until > moment + 1 and _goes_on(beside.slice(moment, moment + 2)) else moment + 1
-    # The pose was laid on the body of the first one by itself, and where it is these frames are, too.
-    hips = hips_of(held.skeleton)
-    off = end.positions()[0, hips] - beside.slice(moment, moment + 1).positions()[0, hips]
-    on = Placement(shift=(float(off[0]), 0.0, float(off[2]))).of(beside.slice(moment + 1, until))
-    parts = [before.slice(since, last), laid, on]
+    parts = [before.slice(since, last), laid, beside.slice(moment + 1, until)]
     return Blocked(laid.joined(parts), [len(parts[0]) + key for key in sorted(poses)], said)
+
+
+def _sound(clip: Clip, frame: int) -> tuple[Clip, int]:
+    """A clip without what has nothing to do with its motion at its ends, but for the frame that is meant, and
+    which that is then."""
+    odd = {*strays(clip)} - {frame}
+    start, stop = int(0 in odd), len(clip) - int(len(clip) - 1 in odd)
+    return clip.slice(start, stop), frame - start
 
 
 def _goes_on(clip: Clip) -> bool:

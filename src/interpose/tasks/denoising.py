@@ -17,8 +17,8 @@ from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import put_back
 from interpose.observation.finding import STUCK, Finding
+from interpose.observation.frozen import held_values
 from interpose.observation.scan import intact, scan
-from interpose.skeletons.carrier import place_of
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import seed_of
 from interpose.tasks.recovering import swaps, with_sides
@@ -83,18 +83,8 @@ def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
         for one in found
         if one.start < stop
         and start < one.stop
-        and not gone[one.start : one.stop, _values(clip, one)[0]].any()
+        and not gone[one.start : one.stop, held_values(clip, one)[0]].any()
     ]
-
-
-def _values(clip: Clip, one: Finding) -> tuple[list[int], list[int]]:
-    """The joints of a finding that do not turn, and those whose place stands still."""
-    joints = [*range(len(clip.skeleton))] if one.joints is None else [*map(clip.skeleton.index, one.joints)]
-    if one.kind == "frozen position":
-        return [], joints
-    if one.kind == "frozen body":
-        return joints, [place_of(clip)]
-    return joints, joints if one.joints is None else []
 
 
 def _led_over(clip: Clip, frozen: Sequence[Finding]) -> Clip:
@@ -104,7 +94,7 @@ def _led_over(clip: Clip, frozen: Sequence[Finding]) -> Clip:
         return clip
     seen = Observation.full(clip)
     for one in frozen:
-        turns, places = _values(clip, one)
+        turns, places = held_values(clip, one)
         seen.rotation[one.start : one.stop, turns] = False
         seen.translation[one.start : one.stop, places] = False
     return Spline().complete(clip, seen).clip
@@ -124,7 +114,7 @@ def _with_frozen(done: Completion, clip: Clip, frozen: Sequence[Finding]) -> Com
     turned, moved = (np.zeros(done.provenance.shape, bool) for _ in range(2))
     columns = list(clip.translated)
     for one in frozen:
-        turns, places = _values(clip, one)
+        turns, places = held_values(clip, one)
         kept = [*range(one.start, one.stop)]
         for frame in {one.start - 1, one.stop} & {*range(len(clip))}:
             held = (clip.rotation[frame, turns] == clip.rotation[one.start, turns]).all()

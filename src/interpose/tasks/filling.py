@@ -81,6 +81,8 @@ def fill(
     observation = replace(observation, pins=(*observation.pins, *pins))
     clip, observation = lay(clip, observation, fitted(parts, clip))
     piecemeal = isinstance(gaps, Observation) and not observation.pins and method in ("auto", "spline")
+    # Numbers count what was observed.
+    piecemeal = piecemeal and only is None and not methods
     brief = momentary(clip, observation) if piecemeal else None
     if brief:
         clip, observation = mended(clip, observation, brief)

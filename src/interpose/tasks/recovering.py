@@ -15,7 +15,7 @@ from interpose.finish.report import JointMoments
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import Bend, Exchange, Taken, crossovers, exchanges, put_back
-from interpose.observation.frozen import stuck
+from interpose.observation.frozen import held_values, stuck
 from interpose.observation.scan import intact, strays
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
@@ -136,15 +136,11 @@ def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
     seen, odd = intact(clip), strays(clip)
     seen.rotation[odd], seen.translation[odd] = True, True
     for one in stuck(clip):
-        held = [clip.skeleton.index(name) for name in one.joints or ()]
-        if one.kind == "frozen body":
-            seen.rotation[one.start : one.stop, held] = False
-            held = line_of(clip)
-        elif {*held} & {*line_of(clip)}:
-            held = [*held, place_of(clip)]
+        turns, places = held_values(clip, one)
+        seen.rotation[one.start : one.stop, turns] = False
         # A rest pose beside the frames in which a body is stuck does not tell where it is either.
         beside = [frame for frame in odd if one.start - 1 <= frame <= one.stop]
-        seen.translation[np.ix_([*range(one.start, one.stop), *beside], held)] = False
+        seen.translation[np.ix_([*range(one.start, one.stop), *beside], places)] = False
     seen.rotation[:start], seen.translation[:start] = True, True
     seen.rotation[stop:], seen.translation[stop:] = True, True
     return seen

@@ -154,11 +154,12 @@ def _tried(
     the motion beside it, from its length on up to TRIED more; of those in which least is flagged. Where
     something is in each, shorter ones are tried, too."""
     lengths, whys, fps = [], [], line.clip.fps
-    for way, gap in zip(line.ways, line.gaps):
+    edges = [0, *(gap.start for gap in line.gaps), len(line.clip)], [0, *(gap.stop for gap in line.gaps)]
+    for k, (way, gap) in enumerate(zip(line.ways, line.gaps)):
         near, own, by = round(BESIDE * fps) + 1, len(gap), max(1, round(fps / 10))
         ends = (
-            line.clip.slice(max(0, gap.start - near), gap.start),
-            line.clip.slice(gap.stop, gap.stop + near),
+            line.clip.slice(max(edges[1][k], gap.start - near), gap.start),
+            line.clip.slice(gap.stop, min(edges[0][k + 2], gap.stop + near)),
         )
         judged: dict[int, tuple[int, float]] = {}
         longer, shorter = (
