@@ -1,4 +1,4 @@
-"""What `fill`, `between` and `recover` leave behind: clip, report (to be replayed), and a page to look at."""
+"""What verbs leave behind: clip, report (of `fill`, `between` and `recover` to be replayed), and a page."""
 
 from __future__ import annotations
 
@@ -323,7 +323,7 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
 def _legend(gaps: list[GapReport]) -> Iterator[str]:
     """What the columns mean, of those that are there."""
     if any(gap.seam_after is not None for gap in gaps):
-        usual = "" if gaps[0].seam_limit is None else ": what 95 of 100 of its own are below"
+        usual = "" if all(gap.seam_limit is None for gap in gaps) else ": what 95 of 100 of its own are below"
         yield f"seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit{usual}"
     yield "bones: largest change of a length, cm"
     if any(gap.foot_slide is not None for gap in gaps):

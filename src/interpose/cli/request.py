@@ -27,7 +27,6 @@ LEFT = {
     "jump": "jumps",
     "noisy": "noise",
     "repeated": "repeated frames",
-    "doubled": "doubled frames",
     "splined": "what was splined",
     "still": "what stands still",
 }

@@ -81,7 +81,7 @@ class Base:
     """Completes poses by what it has seen; thinks at 30 fps on 22 joints scaled to one leg.
 
     Attributes:
-        name: of the weights: base, small or small-open.
+        name: of the weights: base, small, small-open, or the folder they lie in.
         action: a label of its card; "" leaves it open.
         trained: the weights; the installed ones without any.
         beside: the name of installed weights that are asked, too, unless others were trained: the mean of

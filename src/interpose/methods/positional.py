@@ -142,7 +142,7 @@ def weave(said: np.ndarray, times: np.ndarray, positions: np.ndarray, known: np.
 def _drift(
     observation: Observation, raw: np.ndarray, completed: np.ndarray, times: np.ndarray, body: Humanoid
 ) -> dict[str, float]:
-    """Metres by which the root had drifted at the end of each gap, before it was corrected."""
+    """Metres by which the root had drifted at most in each gap, before it was corrected."""
     off = np.linalg.norm((raw - completed)[:, 0], axis=-1) / body.scale
     drift = {}
     for gap in observation.gaps(body.mapping.skeleton):

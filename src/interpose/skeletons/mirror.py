@@ -136,6 +136,7 @@ def mirror(clip: Clip) -> Clip:
         raise RequestError(
             "the clip cannot be mirrored",
             "joints of one side have animated positions, and those of the other have none",
+            "Write positions of both, or of neither.",
         )
     flipped = np.where(np.isin(clip.translated, roots)[:, None] & [True, False, False], -1.0, 1.0)
     flipped[~np.isin(clip.translated, roots), axis] = -1.0

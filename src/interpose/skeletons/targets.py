@@ -23,8 +23,8 @@ def following(clip: Clip, known: np.ndarray, turns: np.ndarray) -> np.ndarray:
     clip, known, turns: as in `seated`.
     """
     found, whole = np.zeros(known.shape, bool), known & turns
+    turned, placed = clip.kinematics()
     for joint in _beside(clip, whole):
-        turned, placed = clip.kinematics()
         if seats := _seats(turned, placed, joint, whole, clip.skeleton):
             found[:, joint] = whole[:, joint] & ~_both(joint, seats[0][0], whole, clip.skeleton)
     return found

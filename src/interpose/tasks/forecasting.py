@@ -34,7 +34,7 @@ class Forecast(Completion):
     samples: list[Completion]
 
     def spread(self) -> np.ndarray:
-        """(frames,) cm by which joints of the samples lie from their mean, in the mean, in each new frame."""
+        """(frames,) cm by which joints of the samples lie apart, in the root mean square, by new frame."""
         positions = np.stack([one.clip.slice(self.start, len(one.clip)).positions() for one in self.samples])
         off = np.linalg.norm(positions - positions.mean(axis=0), axis=-1)
         return np.asarray(100 * np.sqrt(np.square(off).mean(axis=(0, 2))))

@@ -32,7 +32,7 @@ class Loop:
     Attributes:
         placement: how the whole motion is turned and shifted each time it comes round.
         why: what decided the length of the last gap, where nobody said it.
-        jump, limit: cm a frame squared, the velocity jump at frame 0, so placed, after the last two frames,
+        jump, limit: cm a frame squared, the velocity jump at frame 0, so placed, after the last frame,
             of the joint that comes nearest to its limit or goes furthest beyond; and that limit, as at seams.
     """
 
