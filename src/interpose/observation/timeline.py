@@ -177,38 +177,69 @@ def lay(
     body, carried = find_humanoid(everything), carriers(everything)
     done, laid, gaps = [first], [Laid(first.name, 0, len(first))], []
     for number, ((clip, scale), count) in enumerate(zip(fitted[1:], counts), start=1):
-        before, start = done[-1], laid[-1].stop
-        last, then, why = end(body, before, -1), end(body, clip, 0), ""
-        # Strides foretell a turn by their mean: who is amid one would be led astray, by up to 40 degrees.
         # The beginning of a loop is no later part of a take: where it lies, and how high, tells nothing.
-        on = goes_on(before, clip, count + 1) if align and count and number < len(clips) else None
-        step = in_step(body, before, clip) if align and not on and body.mapping.usable else None
-        if told := on or step:
-            last, then = (replace(one, velocity=way) for one, way in zip((last, then), told.velocities))
-        yaw = 0.0
-        if align:
-            yaw = told.yaw if told else last.course - then.course
-        if count is None and align:
-            turned = Placement(yaw).of(clip, carried)
-            begins = replace(then, velocity=turn(then.velocity, np.array(yaw)))
-            count, why = unhurried_length(last, begins, before, turned)
-            if step:
-                count = step.frames(count + 1) - 1
-                why = f"in step, a stride takes {step.stride / first.fps:.2f} s (the shortest: {why})"
-        elif count is None:
-            count, why = plausible_length(before, len(before) - 1, clip, 0)
-        if step:
-            yaw += step.rate * (count + 1)
-        yaw = float(wrap(np.array(yaw)))
-        rise = on.rise if on else 0.0
-        placed = ahead(last, then, yaw, (count + 1) / first.fps, rise) if align else Placement()
+        before, ended, later = done[-1], laid[-1].stop, number < len(clips)
+        way = _way(body, carried, before, clip, count, later) if align else _as_it_lies(before, clip, count)
+        start = ended + way.frames
+        gaps.append(Gap(ended, start))
+        laid.append(Laid(clip.name, start, start + len(clip), way.placement, scale, way.why, way.in_step))
         held = before.slice(len(before) - 1, len(before))
-        done += [held] * count + [placed.of(clip, carried)]
-        gaps.append(Gap(start, start + count))
-        stop = start + count + len(clip)
-        laid.append(Laid(clip.name, start + count, stop, placed, scale, why, step is not None))
+        done += [held] * way.frames + [way.placement.of(clip, carried)]
     again = laid.pop() if loop else None
     return Timeline(first.joined(done), gaps, laid, again)
+
+
+@dataclass(frozen=True)
+class Way:
+    """How one clip leads to the next.
+
+    Attributes:
+        frames: how many lie between them.
+        placement: how the next one is turned and shifted.
+        why: what decided the length, where nobody said it.
+        in_step: strides did.
+    """
+
+    frames: int
+    placement: Placement = Placement()
+    why: str = ""
+    in_step: bool = False
+
+
+def _as_it_lies(before: Clip, clip: Clip, count: int | None) -> Way:
+    """To a clip that stays where it is, in so many frames, or in as many as the way takes."""
+    if count is not None:
+        return Way(count)
+    frames, why = plausible_length(before, len(before) - 1, clip, 0)
+    return Way(frames, why=why)
+
+
+def _way(
+    body: Humanoid, carried: Sequence[int], before: Clip, clip: Clip, count: int | None, later: bool
+) -> Way:
+    """To a clip that is placed to go on, in so many frames, or in as many as is unhurried; a `later` one may
+    be a later part of the same take."""
+    last, then, why = end(body, before, -1), end(body, clip, 0), ""
+    # Strides foretell a turn by their mean: who is amid one would be led astray, by up to 40 degrees.
+    on = goes_on(before, clip, count + 1) if count and later else None
+    step = in_step(body, before, clip) if not on and body.mapping.usable else None
+    yaw = last.course - then.course
+    if told := on or step:
+        last, then = (replace(one, velocity=way) for one, way in zip((last, then), told.velocities))
+        yaw = told.yaw
+    if count is None:
+        turned = Placement(yaw).of(clip, carried)
+        begins = replace(then, velocity=turn(then.velocity, np.array(yaw)))
+        count, why = unhurried_length(last, begins, before, turned)
+        if step:
+            count = step.frames(count + 1) - 1
+            why = f"in step, a stride takes {step.stride / before.fps:.2f} s (the shortest: {why})"
+    if step:
+        yaw += step.rate * (count + 1)
+    yaw = float(wrap(np.array(yaw)))
+    rise = on.rise if on else 0.0
+    placed = ahead(last, then, yaw, (count + 1) / before.fps, rise)
+    return Way(count, placed, why, step is not None)
 
 
 def bounded(frames: int, fps: float) -> None:
@@ -255,7 +286,7 @@ def end(body: Humanoid, clip: Clip, frame: int) -> End:
     if not body.mapping.usable:
         root = rotations.twist_about(part.kinematics()[0][frame, hips], UP.values)
         return End(places[frame], velocity, float(2 * np.arctan2(root[2], root[0])))
-    course = float(facing(body.positions(part.slice(0, len(part)))[frame]) * body.hand[0])
+    course = float(facing(body.positions(part)[frame]) * body.hand[0])
     travel = float(np.arctan2(velocity[0], velocity[2]))
     if np.linalg.norm(velocity) > STANDS and abs(wrap(np.array(travel - course))) < FORWARD:
         course = travel
