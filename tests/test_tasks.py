@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import textwrap
 from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -24,7 +26,7 @@ from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.methods import base, registry, weights
-from interpose.observation import Gap, Observation, timeline
+from interpose.observation import Gap, Observation, Pin, timeline
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 from interpose.tasks import filling, stitching, windows
@@ -850,3 +852,19 @@ def test_the_beginning_of_a_clip_is_said_as_firmly_as_its_end(cmu_walk, monkeypa
     for gap in (Gap(0, 25), Gap(len(cmu_walk) - 25, len(cmu_walk))):
         tasks.fill(cmu_walk, [gap], "small")
     assert set(guessed) == {0}
+
+
+def test_frames_of_points_between_poses_count_from_the_first_in_what_is_said(cmu_walk):
+    start, target = cmu_walk.slice(0, 60), cmu_walk.slice(100, 160)
+    hand = Pin("LeftHand", np.array([45]), np.zeros((1, 3)))
+    for asked in ({"path": {40: (0.0, 0.0)}}, {"path": {-3: (0.0, 0.0)}}, {"pins": [hand]}):
+        frame = 45 if "pins" in asked else next(iter(asked["path"]))
+        with pytest.raises(RequestError, match=f"at frame {frame}"):
+            tasks.pose_to_pose(start, target, 30, method="spline", **asked)
+
+
+def test_a_folder_of_the_name_of_a_method_is_a_folder(cmu_walk, tmp_path, monkeypatch):
+    shutil.copytree(weights.find("small-open").onnx.parent, tmp_path / "small")
+    monkeypatch.chdir(tmp_path)
+    assert registry.get(Path("small")).trained.name == "small-open"
+    assert registry.get("small").trained is None

@@ -193,3 +193,12 @@ def test_a_pose_that_is_known_but_for_its_hips_turn_faces_as_the_body_does(data,
     assert off.mean() < most, "it was 3.7 and 5.0 when the pose was laid on hips of another"
     feet_of = feet.ends(clip.skeleton)
     assert done.positions()[inside][:, feet_of, 1].min() > clip.positions()[:, feet_of, 1].min() - 0.03
+
+
+def test_poses_of_one_jump_are_no_three(cmu_walk):
+    """Seven frames in the air, one after another, tell no floor."""
+    low = sunk(cmu_walk)
+    seen = Observation.from_gaps(cmu_walk, [Gap(0, GAP.start - 4), GAP, Gap(GAP.stop + 4, len(cmu_walk))])
+    deep, joints = floor.depth(low, seen)
+    ends = [joints.index(joint) for joint in feet.ends(cmu_walk.skeleton)]
+    assert deep[GAP.start : GAP.stop, ends].max() <= 0

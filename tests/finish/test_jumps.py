@@ -86,3 +86,20 @@ def test_what_jumps_at_a_lone_key_is_said_and_softened(cmu_walk):
             jumps.soften(kinked, known, span, None)
     size = np.linalg.norm(seams.jumps(kinked, known, np.array([60])), axis=-1).max() * 900
     assert size < jumps.wild(cmu_walk.skeleton)
+
+
+def test_a_hand_that_is_lost_all_along_makes_no_lone_keys_of_other_seams(cmu_walk):
+    arm = ("RightArm", "RightForeArm", "RightHand")
+    alone, beside = (
+        interpose.fill(cmu_walk, [Gap(90, 130, arm), *more], method="linear").report.gaps
+        for more in ((), (Gap(60, 160, ("LeftHand",)),))
+    )
+    seam = next(gap for gap in beside if gap.start == 90)
+    assert seam.seam_limit == pytest.approx(alone[0].seam_limit, rel=0.2)
+    assert seam.seam_after <= jumps.SLACK * seam.seam_limit
+    seen = Observation.from_gaps(
+        cmu_walk, [Gap(90, 130, arm), Gap(131, 140, arm), Gap(60, 160, ("LeftHand",))]
+    )
+    lone = seams.lone(cmu_walk, seen, np.array([89, 130]))
+    hands = [cmu_walk.skeleton.index(side + "Hand") for side in ("Right", "Left")]
+    assert lone[:, hands].tolist() == [[False, False], [True, False]]

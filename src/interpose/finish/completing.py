@@ -26,6 +26,9 @@ from interpose.observation import Gap, Observation, Pin
 
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
+# Metres from which on a foot that hovers, as a hand is pinned, is let down; and centimetres a second by which
+# feet may slide more for it.
+HOVERS, SLIDES = 0.002, 1.0
 # Metres by which nobody is led elsewhere.
 UNMOVED = 0.01
 # A path on which the hips go this much further than without it is said to be too long.
@@ -174,6 +177,11 @@ class _Told:
         return self.method.complete(clip, replace(observation, pins=self.pins), seed)
 
 
+def _slides(done: Completion) -> float:
+    """At how many centimetres a second feet slide in the gap in which they do most."""
+    return max((gap.foot_slide or 0.0 for gap in done.report.gaps), default=0.0)
+
+
 def _pinned(
     clip: Clip, observation: Observation, ask: Ask, path: Mapping[int, np.ndarray] | None
 ) -> Completion:
@@ -187,9 +195,18 @@ def _pinned(
     ways = pins.ways(unled.clip, known, asked)
     told = _Told(ask.method.name, ask.method, ways)
     body = _complete(clip, free, replace(ask, method=told), path) if ways else unled
-    met = pins.meet(body.clip, known, asked, pins.hovering(body.clip, known, unled.clip))
-    layer = Layer(ask.method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
-    done = _told_of(body, _complete(clip, free, replace(ask, method=layer, fallback=layer), None))
+
+    def laid(down: np.ndarray | None = None) -> Completion:
+        met = pins.meet(body.clip, known, asked, down)
+        layer = Layer(ask.method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
+        return _complete(clip, free, replace(ask, method=layer, fallback=layer), None)
+
+    done, high = laid(), pins.hovering(body.clip, known, unled.clip)
+    if high.max(initial=0.0) > HOVERS:
+        lower = laid(high)
+        # Feet that are let down out of a step would slide.
+        done = lower if _slides(lower) <= _slides(done) + SLIDES else done
+    done = _told_of(body, done)
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
     away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(unled.clip, asked)}
     way = over_floor(done.clip)

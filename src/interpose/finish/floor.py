@@ -25,10 +25,10 @@ BLEND = 0.15
 # How much the place of every other joint counts beside those that are lifted, round by round; and how many
 # times more those of feet do.
 SHARES, FEET = (1e-1, 1e-2), 10.0
-# Poses that are to be known, so many seconds apart, for feet to tell the floor; else they are lifted under
-# hips that are lower than this (metres) above it, as those of a body that does not stand. What is as far
-# above the lowest is none.
-POSES, APART, LOW, ABOUT = 3, 0.1, 0.5, 0.2
+# Poses that are to be known, so many seconds apart, for feet to tell the floor: a jump holds fewer. Else they
+# are lifted under hips that are lower than this (metres) above it, as those of a body that does not stand.
+# What is as far above the lowest is none.
+POSES, APART, LOW, ABOUT = 3, 0.4, 0.5, 0.2
 # How high hips are, in legs, of a body that stands or crouches on the floor.
 UPRIGHT = (0.75, 1.2)
 # Metres from a hand or the head within which what hangs from it is part of the body, as fingers are.
@@ -67,10 +67,19 @@ def depth(clip: Clip, known: Observation) -> tuple[np.ndarray, list[int]]:
         own = float(heard[:, kind].min())
         bound[kind] = own if own - low < ABOUT * size else low
     below = np.where(observed, 0.0, bound - heights)
-    if np.unique(np.flatnonzero(tells) // max(1.0, APART * clip.fps)).size < POSES:
+    if _poses(np.flatnonzero(tells), APART * clip.fps) < POSES:
         stands = heights[:, hips_of(clip.skeleton)] > low + LOW * size
         below[:, ends] *= ~stands[:, None]
     return below[:, joints], joints
+
+
+def _poses(frames: np.ndarray, apart: float) -> int:
+    """How many of the frames, in order, are that far apart."""
+    count, last = 0, -np.inf
+    for frame in frames.tolist():
+        if frame - last >= apart:
+            count, last = count + 1, frame
+    return count
 
 
 def _beyond(mapping: Mapping) -> list[int]:

@@ -62,13 +62,13 @@ class Bounds:
         torn = np.full(len(skeleton), TORN / fps**2)
         return cls(np.full_like(torn, np.inf), torn, np.full_like(torn, wild(skeleton) / fps**2))
 
-    def at(self, known: Observation, frames: np.ndarray) -> np.ndarray:
+    def at(self, clip: Clip, known: Observation, frames: np.ndarray) -> np.ndarray:
         """(n, J) at observed frames (n,)."""
-        return np.where(seams.lone(known, frames)[:, None], self.peak, self.seam)
+        return np.where(seams.lone(clip, known, frames), self.peak, self.seam)
 
-    def softened(self, known: Observation, frames: np.ndarray) -> np.ndarray:
+    def softened(self, clip: Clip, known: Observation, frames: np.ndarray) -> np.ndarray:
         """(n, J) at observed frames (n,), before that is softened."""
-        return np.where(seams.lone(known, frames)[:, None], self.key, self.seam)
+        return np.where(seams.lone(clip, known, frames), self.key, self.seam)
 
 
 def wild(skeleton: Skeleton) -> float:
@@ -105,7 +105,7 @@ def beside(
     if not frames.size:
         return None
     return _nearest(
-        seams.seam_jumps(clip, known, frames), None if bounds is None else bounds.at(known, frames)
+        seams.seam_jumps(clip, known, frames), None if bounds is None else bounds.at(clip, known, frames)
     )
 
 
@@ -134,7 +134,7 @@ def peak_limits(hidden: Clip, known: Observation, limits: np.ndarray) -> np.ndar
     largest = np.where(own < TORN / hidden.fps**2, own, 0.0).max(axis=0, initial=0.0)
     most = np.maximum(seams.PEAKS * limits, seams.OWN_PEAKS * largest)
     body = list(find_mapping(hidden.skeleton).mapped[1]) or slice(None)
-    least = SETS_OFF if len(own) >= TELLS * hidden.fps else wild(hidden.skeleton)
+    least = SETS_OFF if len(own) >= TELLS * hidden.fps else max(SETS_OFF, wild(hidden.skeleton))
     return np.maximum(most, max(most[body].max(), least / hidden.fps**2))
 
 
@@ -149,7 +149,7 @@ def excess(
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     within = _inner(current, np.arange(span.start, span.stop))
     for frames, jumps, limits, where in (
-        (edges, seams.seam_jumps, bounds.at(known, edges), "at a seam"),
+        (edges, seams.seam_jumps, bounds.at(current, known, edges), "at a seam"),
         (within, seams.jumps, bounds.peak, "inside the gap"),
     ):
         if frames.size:
@@ -205,7 +205,7 @@ def soften(current: Clip, known: Observation, span: Span, bounds: Bounds | None)
     bounds = bounds or Bounds.untold(current.skeleton, current.fps)
     size, most = (
         np.linalg.norm(seams.seam_jumps(current, known, edges), axis=-1),
-        bounds.softened(known, edges),
+        bounds.softened(current, known, edges),
     )
     if not (size > most).any() or size.max() >= KINK / current.fps:
         return 0.0

@@ -22,6 +22,7 @@ from interpose.skeletons.carrier import carriers, hips_of, moved
 
 # Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.
 SLOW = 0.25
+BEYOND = 1.2  # times as far aside as any point says: a spline that swings out further is none
 SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
 FLOOR = np.array([1.0, 0.0, 1.0])
 EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
@@ -54,20 +55,24 @@ def over_floor(clip: Clip) -> np.ndarray:
 def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) -> Clip:
     """The clip with its hips led through points over frames start to stop - 1.
 
-    Both ends stay where they are, and come and go at the same velocity; in between the way is moved by no
-    further than the points say (piecewise cubic, Fritsch and Carlson 1980). The body is turned by as much as
-    the direction of the way has changed; a root above the hips goes along if it moves at all.
+    Both ends stay where they are, and come and go at the same velocity; in between the way is moved by a
+    cubic spline that meets the points, or, where that swings out beyond them, as of points near an end, by a
+    piecewise cubic that does not (Fritsch and Carlson 1980). The body is turned by as much as the direction
+    of the way has changed; a root above the hips goes along if it moves at all.
 
     Args:
         clip: F frames; start is at least 1 and stop at most F - 1.
         points: x and z in metres for frames from start to stop - 1.
     """
     frames = np.arange(start - 1, stop + 1)
-    # With a second one beyond it an end is left and reached as it was.
-    knots, places = [start - 2, start - 1, *sorted(points), stop, stop + 1], over_floor(clip)
+    knots, places = [start - 1, *sorted(points), stop], over_floor(clip)
     off = np.zeros((len(knots), 2))
-    off[2:-2] = [points[k] - places[k] for k in sorted(points)]
-    shift = scipy.interpolate.PchipInterpolator(knots, off)(frames)
+    off[1:-1] = [points[k] - places[k] for k in sorted(points)]
+    shift = scipy.interpolate.CubicSpline(knots, off, bc_type="clamped")(frames)
+    if np.linalg.norm(shift, axis=1).max() > BEYOND * np.linalg.norm(off, axis=1).max():
+        # With a second one beyond it an end is left and reached as it was.
+        knots, off = [start - 2, *knots, stop + 1], np.pad(off, ((1, 1), (0, 0)))
+        shift = scipy.interpolate.PchipInterpolator(knots, off)(frames)
     old = places[frames]
     near = np.minimum(frames - frames[0], frames[-1] - frames) / clip.fps
     turn = rotations.about("Y", _turns(old, old + shift, near, clip.fps))

@@ -95,8 +95,9 @@ def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
                 "a quaternion of it is zero",
                 "No turn is 1, 0, 0, 0.",
             )
-        # It is the joint itself that turns.
+        # It is the joint itself that turns: where it is to is known only if all above it is.
         known = {"position": placed, "orientation": turned | observation.rotation}
+        tells = {"position": placed, "orientation": turned}
         here = clip.take(frames).kinematics()
         for kind, seen in known.items():
             if (values := getattr(pin, kind)) is None:
@@ -106,7 +107,7 @@ def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
                 other = np.linalg.norm(here[1][:, joint] - values, axis=1) > pin.tolerance
             else:
                 other = rotations.angle(here[0][:, joint], rotations.normalize(np.asarray(values))) > TURNED
-            if (wrong := told & other).any():
+            if (wrong := told & (other | ~tells[kind][frames, joint])).any():
                 raise RequestError(
                     f"{pin.joint} cannot be pinned at frame {frames[wrong][0]}",
                     "where it is, or how it is turned, follows from what is observed, which comes back "
@@ -205,9 +206,10 @@ def _gaps(known: Observation) -> Iterator[tuple[tuple[int, int], tuple[int, int]
 
 
 def hovering(clip: Clip, known: Observation, standing: Clip) -> np.ndarray:
-    """(F, n) metres by which `feet.ends` are higher than in another motion, where they stand in that.
+    """(F, n) metres by which `feet.ends` are higher than in another motion, where they stand in both.
 
-    A network that is told where a hand is to be lifts the whole body a little, both feet off the floor.
+    A network that is told where a hand is to be lifts the whole body a little, both feet off the floor. None
+    is to come lower than where it rests.
     """
     ends, pairs, grown = feet.ends(clip.skeleton), feet.pairs(clip.skeleton), feet.size(clip.skeleton)
     high = np.zeros((len(clip), len(ends)))
@@ -216,15 +218,17 @@ def hovering(clip: Clip, known: Observation, standing: Clip) -> np.ndarray:
     placed, seen = standing.positions() / grown, known.positions(clip.skeleton)
     floors = feet.local_floor(placed[:, pairs], seen[:, pairs], clip.fps).reshape(len(clip), -1)
     floor = floors[:, [pairs.ravel().tolist().index(end) for end in ends]]
-    stands = feet.contacts(placed[:, ends], floor, clip.fps) & ~seen[:, ends]
-    off = np.where(stands, clip.positions()[:, ends, 1] - grown * placed[:, ends, 1], 0.0)
+    now = clip.positions()[:, ends] / grown
+    stands = feet.contacts(placed[:, ends], floor, clip.fps) & feet.contacts(now, floor, clip.fps)
+    above = grown * np.maximum(now[..., 1] - floor, 0.0)
+    off = np.where(stands & ~seen[:, ends], grown * (now[..., 1] - placed[:, ends, 1]), 0.0)
     for start, stop in runs(~known.frames):
         inside = np.zeros(len(clip), bool)
         inside[start:stop] = True
         fade = np.prod(envelope(inside, over := max(2.0, LEAD * clip.fps)), axis=0)
         for row, column in enumerate(off.T):
             high[:, row] += fade * spread(np.where(inside, np.maximum(column, 0.0), 0.0), over)
-    return high
+    return np.minimum(high, above)
 
 
 def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray) -> Clip:

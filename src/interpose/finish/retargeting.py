@@ -121,6 +121,7 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     made = _laid(made, mine, points)
     # A root above the hips goes and turns along, and targets stay on feet and hands, if they do so in the
     # other clip.
+    like = replace(like, fps=clip.fps)
     whole = like.joined([like, made])
     known = np.tile((np.arange(len(whole)) < len(like))[:, None], len(like.skeleton))
     whole = seated(rooted(whole, known, known, len(like)), known, known)

@@ -168,27 +168,34 @@ def seam_jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
     what a lost hand does where the body is lost, too. A place that is lost alone is the seam of the joint
     that has it: all others move against it as they are known to.
     """
+    moved = _parting(motion, known, at, -1) | _parting(motion, known, at, 1)
+    placed = Observation(known.rotation[at], known.translation[at]).positions(motion.skeleton)
+    return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
+
+
+def lone(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
+    """(n, J) which joints have a lone key at observed frames (n,): a seam of theirs on both sides."""
+    return _parting(motion, known, at, -1) & _parting(motion, known, at, 1)
+
+
+def _parting(motion: Clip, known: Observation, at: np.ndarray, way: int) -> np.ndarray:
+    """(n, J) which joints hang from a value that is known at frames (n,) and missing beside it, one frame
+    before or after (`way` -1 or 1)."""
     columns = list(motion.translated)
-    turned, shifted = (now[at] & ~(now[at - 1] & now[at + 1]) for now in (known.rotation, known.translation))
+    turned, shifted = (now[at] & ~now[at + way] for now in (known.rotation, known.translation))
     moved = np.zeros_like(turned)
     for joint, parent in enumerate(motion.skeleton.parents):
         if parent >= 0:
             moved[:, joint] = moved[:, parent] | turned[:, parent]
     moved[:, columns] |= shifted[:, columns]
-    placed = Observation(known.rotation[at], known.translation[at]).positions(motion.skeleton)
-    return np.where((moved & placed)[..., None], jumps(motion, known, at), 0.0)
-
-
-def lone(known: Observation, at: np.ndarray) -> np.ndarray:
-    """(n,) which of the observed frames (n,) are lone keys: something is missing on both sides."""
-    return ~(known.frames[at - 1] | known.frames[at + 1])
+    return moved
 
 
 def soften(
     motion: Clip,
     known: Observation,
     span: tuple[int, int],
-    limits: Callable[[Observation, np.ndarray], np.ndarray],
+    limits: Callable[[Clip, Observation, np.ndarray], np.ndarray],
 ) -> Clip:
     """Bring velocity jumps at the seams of the span below the limits of the joints at n observed frames (n,
     J), metres per frame squared.
@@ -197,7 +204,7 @@ def soften(
     they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
     """
     at = edges(known, motion.translated, span)
-    jump, most = seam_jumps(motion, known, at), limits(known, at)
+    jump, most = seam_jumps(motion, known, at), limits(motion, known, at)
     size = np.linalg.norm(jump, axis=-1)
     with np.errstate(invalid="ignore"):  # where there is no limit
         share = np.where(size > most, 1 - MARGIN * most / np.maximum(size, 1e-12), 0.0)

@@ -65,12 +65,12 @@ def get(name: str | Method) -> Method:
                 "Give a name, or an object as interpose.methods.protocol.Method says.",
             )
         return name
-    name = fspath(name)
-    if name in METHODS or name in _offered():
+    folder, name = isinstance(name, PathLike), fspath(name)
+    if not folder and (name in METHODS or name in _offered()):
         return _named(name)
     if not (name and Path(name).is_dir()):
         raise unknown("method", name, [*names(), "a folder with weights"])
-    card = weights.card(name)
+    card = weights.within(name)
     method: Any = _named(card.method) if card.method in METHODS else None
     held = {field.name for field in fields(method)} if is_dataclass(method) else set()
     if "trained" not in held:

@@ -284,11 +284,16 @@ def card(name: str) -> Card:
             return known
     if not (name and Path(name).is_dir()):
         raise unknown("model", name, [known.name for known in cards()])
-    found = [*Path(name).glob("*.onnx")]
+    return within(name)
+
+
+def within(folder: str) -> Card:
+    """The card of the only weights in a folder. RequestError where it has none, or several."""
+    found = [*Path(folder).glob("*.onnx")]
     if len(found) != 1:
         there = " and ".join(sorted(path.name for path in found)) or "none"
         raise RequestError(
-            f"the folder {name} is no model",
+            f"the folder {folder} is no model",
             f"it would have one .onnx file with its card beside it, and has {there}",
             "Name the folder that interpose export, or interpose train, wrote.",
         )

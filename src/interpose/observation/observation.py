@@ -198,7 +198,7 @@ class Observation:
         fill = object.__setattr__
         fill(self, "rotation", _flags(self.rotation))
         fill(self, "translation", _flags(self.translation))
-        fill(self, "pins", (self.pins,) if isinstance(self.pins, Pin) else tuple(self.pins))
+        fill(self, "pins", (self.pins,) if isinstance(self.pins, Pin) else tuple(self.pins or ()))
         if wrong := [pin for pin in self.pins if not isinstance(pin, Pin)]:
             raise unfit("pins", wrong[0], "Pins")
         if self.rotation.shape != self.translation.shape or self.rotation.ndim != 2:

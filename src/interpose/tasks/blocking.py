@@ -41,6 +41,24 @@ class Blocked:
     keys: list[int]
     said: tuple[str, ...]
 
+    def counted(self, path: Mapping[int, Any], pins: Sequence[Pin]) -> tuple[dict[int, Any], list[Pin]]:
+        """A path and pins whose frames count from the first key on, by frames of the clip.
+
+        Raises RequestError for frames that are not between the first key and the last one.
+        """
+        zero, last = self.keys[0], self.keys[-1] - self.keys[0]
+        told = {frame_number(frame): point for frame, point in path.items()}
+        pinned = [frame_number(frame) for pin in pins for frame in np.ravel(pin.frames).tolist()]
+        keys = {key - zero for key in self.keys}
+        # A joint may be held over a key.
+        if wrong := [
+            frame for frame in (*told, *pinned) if not 0 <= frame <= last or frame in {*told} & keys
+        ]:
+            why = f"the first pose is frame 0, and the last one frame {last}"
+            raise RequestError(f"nothing is generated at frame {wrong[0]}", why, "Choose one between poses.")
+        later = [replace(pin, frames=zero + np.asarray(pin.frames)) for pin in pins]
+        return {zero + frame: point for frame, point in told.items()}, later
+
 
 def edge(clip: Clip, last: bool) -> int:
     """The first frame of a clip, or the `last` one; the one beside where that has nothing to do with it."""
@@ -90,9 +108,7 @@ def pose_to_pose(
     poses = {when: clip.slice(at, at + 1) for when, clip in on_rig.items() for at in [edge(clip, False)]}
     target = on_rig_of(target, start)
     laid = blocked(start, edge(start, True), target, edge(target, False), poses, frames)
-    zero = laid.keys[0]
-    points = {zero + frame_number(frame): point for frame, point in (path or {}).items()}
-    later = [replace(pin, frames=zero + np.asarray(pin.frames)) for pin in pins]
+    points, later = laid.counted(path or {}, pins)
     done = between(laid.clip, laid.keys, action, method, seed, progress, True, points, later)
     gaps = done.report.gaps
     told = [*gaps[:-1], *(replace(gap, notes=(*laid.said, *gap.notes)) for gap in gaps[-1:])]
