@@ -121,7 +121,7 @@ def led(cmu_walk):  # type: ignore[no-untyped-def]
 def test_a_root_that_turns_along_does_so_in_a_gap(cmu_walk, led, gap):
     """It turned the other way round, up to 178 degrees from where the hips faced."""
     done, same = (interpose.fill(clip, gap, method="small").clip for clip in (led, cmu_walk))
-    assert np.ptp(yaws(done)[1][slice(*gap)]) > 35
+    assert np.ptp(yaws(done)[1][slice(*gap)]) > 20, "there is a turn"
     assert apart(done).max() < apart(led).max() + 3
     turns = [np.abs(np.diff(yaws(clip)[0], 2)).max() for clip in (done, led)]
     assert turns[0] < 2 * turns[1], "as smoothly"
