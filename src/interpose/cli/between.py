@@ -104,7 +104,7 @@ def between(
     for one in (file, *others):
         outputs.check(one, force)
     zero = chosen[0] if laid else 0
-    counted = clip.slice(zero, len(clip))
+    counted = clip.slice(zero, chosen[-1] + 1) if laid else clip
     open_ = [Gap(a + 1 - zero, b - zero) for a, b in pairwise(sorted({*chosen})) if b > a + 1]
     points, pins = path_of(path, counted), pins_of(pin, counted, open_)
     if laid:
