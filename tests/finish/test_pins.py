@@ -354,20 +354,15 @@ def test_a_hand_that_is_held_high_does_not_lift_who_stands_off_the_floor(data, o
     assert done.report.gaps[0].pins < 0.1
 
 
-def test_feet_that_step_are_not_let_down(data):
-    """Who walks steps at other times with a pin than without: feet would slide, or go through the floor."""
-    run = load(data / "cmu_run.bvh")
-    gap, hand = Gap(8, 34), run.skeleton.index("RightHand")
-    free = tasks.fill(run, [gap])
-    place = free.clip.positions()[20:21, hand] + [0.0, 0.5, 0.0]
-    done = tasks.fill(run, [gap], pins=[Pin("RightHand", np.array([20]), place)])
-    ends = feet.ends(run.skeleton)
-    lowest = run.positions()[:, ends, 1].min()
-    assert (
-        done.clip.positions()[20:50][:, ends, 1].min()
-        > min(lowest, free.clip.positions()[:, ends, 1].min()) - 0.01
-    )
-    assert done.report.gaps[0].foot_slide < free.report.gaps[0].foot_slide + 5
+def test_feet_are_let_down_neither_out_of_a_step_nor_through_the_floor(data):
+    """Who lands steps at other times with a pin than without: feet slid at 5 cm/s, 3 cm under the floor."""
+    jump = load(data / "cmu_jump.bvh")
+    gap, hand, ends = Gap(60, 110), jump.skeleton.index("RightHand"), feet.ends(jump.skeleton)
+    free = tasks.fill(jump, [gap]).clip.positions()
+    place = free[85:86, hand] + [0.0, 0.5, 0.0]
+    done = tasks.fill(jump, [gap], pins=[Pin("RightHand", np.array([85]), place)])
+    assert done.report.gaps[0].foot_slide < 2
+    assert done.clip.positions()[:, ends, 1].min() > free[:, ends, 1].min() - 0.01
 
 
 def test_how_a_joint_with_lost_parents_is_turned_is_not_known(cmu_walk):
