@@ -83,7 +83,7 @@ def test_what_jumps_at_a_lone_key_is_said_and_softened(cmu_walk):
     assert "at frame 160" in notes.wild(kinked, known, gaps[1], 100)[0]
     for _ in range(3):
         for span in (Span(0, 60, "any"), Span(61, 120, "any")):
-            jumps.soften(kinked, known, span, None)
+            jumps.soften(kinked, known, span, None, lambda clip: {})
     size = np.linalg.norm(seams.jumps(kinked, known, np.array([60])), axis=-1).max() * 900
     assert size < jumps.wild(cmu_walk.skeleton)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.finish import Provenance, anatomy, feet, pins, seams
-from interpose.formats import load
+from interpose.formats import load, save
 from interpose.geometry import rotations
 from interpose.methods.base import pinned
 from interpose.methods.classical import Spline
@@ -26,6 +27,19 @@ ARM = ("LeftArm", "LeftForeArm", "LeftHand")
 def lifted(clip, frame=85, up=(0.0, 0.4, 0.1), joint="LeftHand"):
     """A pin some way from where the joint is."""
     return Pin(joint, np.array([frame]), clip.positions()[[frame], clip.skeleton.index(joint)] + up)
+
+
+@pytest.mark.parametrize("joint", ["rhand", "lwrist", "lfingers"])
+def test_pins_are_met_by_joints_of_few_axes(data, tmp_path, joint):
+    """Wrists and elbows of AMC files turn about one or two: what is written is where it is pinned."""
+    clip = load(data / "cmu_02_03.amc")
+    pin = lifted(clip, 20, (0.1, 0.1, 0.1), joint)
+    done = tasks.fill(clip, [Gap(10, 30)], "spline", pins=[pin])
+    shutil.copy(data / "cmu_02.asf", tmp_path)
+    save(done.clip, tmp_path / "filled.amc")
+    back = load(tmp_path / "filled.amc").positions()[20, clip.skeleton.index(joint)]
+    assert np.linalg.norm(back - pin.position[0]) < 1.1e-3
+    assert not [note for note in done.report.gaps[0].notes if "misses" in note]
 
 
 @pytest.mark.parametrize("method", ["spline", "small", "cae"])

@@ -154,6 +154,14 @@ def test_what_is_said_of_an_amc_clip_is_what_its_file_holds(data, tmp_path, gap,
     assert np.abs(back.positions() - done.positions()).max() < 1e-4
 
 
+@pytest.mark.parametrize("gap", [Gap(10, 30), Gap(14, 26)])
+def test_joints_of_few_axes_leave_no_jumps_to_flag(data, gap):
+    """What their file does not hold of a seam that is softened, others make up for."""
+    report = tasks.fill(formats.load(data / "cmu_02_03.amc"), [gap], "small").report.gaps[0]
+    assert report.method == "small"
+    assert not [note for note in report.notes if note.startswith("flagged")]
+
+
 def test_half_a_turn_between_lone_keys_does_not_tear(cmu_walk):
     """Networks turn all at once there, and no motion is known that would tell how far velocities may jump."""
     clip = cmu_walk.slice(60, 71)

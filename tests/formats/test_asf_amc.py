@@ -409,6 +409,31 @@ def test_what_a_joint_cannot_do_is_passed_on_and_said(body, tmp_path):
     assert "head: 28.6 degrees" in note
 
 
+@pytest.mark.parametrize("up", ["y", "z", "-x"])
+def test_axes_of_joints_that_have_few(data, up):
+    """What is turned about them can be written, what is turned about another cannot."""
+    clip = formats.load(data / "cmu_02_03.amc", up=up)
+    axes = formats.axes(clip, clip.source)
+    assert {clip.skeleton.names[joint]: about.shape[-1] for joint, about in axes.items()} == {
+        bone.name: count for bone in clip.source.asf.bones if (count := len(bone.dof)) < 3
+    }
+
+    def lost(joint: int, axis: np.ndarray) -> float:
+        rotation = clip.rotation.copy()
+        rotation[:, joint] = rotations.multiply(rotations.exp(1e-3 * axis), rotation[:, joint])
+        turned = clip.with_motion(rotation, clip.translation)
+        held = formats.held(turned, clip.source)
+        return float(rotations.angle(held.rotation[:, joint], rotation[:, joint]).max())
+
+    for joint, about in axes.items():
+        for axis in np.moveaxis(about, -1, 0):
+            assert lost(joint, axis) < 1e-5
+        other = np.eye(3) - about @ np.swapaxes(about, -1, -2)
+        assert (
+            lost(joint, rotations.normalize(other[..., np.argmax(np.linalg.norm(other[0], axis=0))])) > 9e-4
+        )
+
+
 def test_longer_and_shorter(body, tmp_path):
     """Frames go on counting; the rate has no place in the file, and that is said."""
     body.write_bytes(body.read_bytes().rstrip())

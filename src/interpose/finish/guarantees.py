@@ -31,11 +31,11 @@ from interpose.finish.opinion import as_rotations, carried, certain, merge, refu
 from interpose.finish.report import Completion, Report
 from interpose.finish.span import Span, write
 from interpose.finish.standing import alone
-from interpose.formats import held
+from interpose.formats import axes, held
 from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
-from interpose.observation import Gap, Observation
+from interpose.observation import Gap, Observation, Pin
 from interpose.skeletons.carrier import rooted
 from interpose.skeletons.targets import seated
 
@@ -46,6 +46,9 @@ STEPPED = "feet step where they would have shuffled"
 ROUNDS = 24
 # One that came no nearer to it, by this share, in so many of them than before is left as it is.
 STALLED, NEARER = 3, 0.998
+# What a round leaves at most of how far pins are missed once they are written, or it is the last: a third is
+# usual where they are within reach.
+LEFT = 0.8
 # Metres a second squared by which joints of legs may jump for their feet to stand, where they do less nearby.
 # Of 300 fills of validation performers three had one that did twice as far as anywhere in the truth; so one
 # has (`bench artefacts --most 25`).
@@ -201,6 +204,8 @@ class _Work:
                     self.stepped[span.start, own] = STEPPED
                     _plant(current, self.firm, span, self.bounds, raw.stands)
                 _change(current, self.firm, span, floor.lifted)
+        for span in chosen:
+            self._holdable(current, span)
         waiting, told = set(range(len(chosen))), [list[float]() for _ in chosen]
         for _ in range(ROUNDS):
             # What a span does can be seen from its neighbours, and from no other.
@@ -208,10 +213,24 @@ class _Work:
             for i, span in enumerate(chosen):
                 if i not in waiting | beside or _stalls(told[i]):
                     continue
-                if excess := jumps.soften(current, self.firm, span, self.bounds):
+                if excess := jumps.soften(current, self.firm, span, self.bounds, self._axes):
                     told[i].append(excess)
+                    self._holdable(current, span)
                     beside |= {i - 1, i, i + 1}
             waiting = beside
+
+    def _axes(self, motion: Clip) -> dict[int, np.ndarray]:
+        return axes(motion, self.clip.source)
+
+    def _holdable(self, current: Clip, span: Span) -> None:
+        """Let joints in a span turn about the axes that their file has."""
+        lo, hi, inner = span.around(len(current), 0)
+        write(current, self._held(current.slice(lo, hi), self.known.slice(lo, hi)), lo, inner)
+
+    def _held(self, motion: Clip, known: Observation) -> Clip:
+        """What the file can hold of some motion, but for what of it is known."""
+        done = held(motion, self.clip.source)
+        return motion if done is motion else merge(done, motion, known)
 
     def fall_back(self) -> None:
         """Let the simpler method fill the spans in which the method's motion does not do, where it does
@@ -251,12 +270,12 @@ class _Work:
         ask, clip, known = self.ask, self.clip, self.known
         current, pinned = self.current, self.layer.pins if self.layer else ()
         if pinned:
-            current = pins.meet(current, known, pinned)
+            current = self._met(current, pinned)
         current = rooted(current, known.translation, known.rotation)
         # What is pinned itself stays where that puts it.
         stays = np.isin(clip.skeleton.names, [pin.joint for pin in pinned])
         current = seated(current, known.translation, known.rotation | stays)
-        current = merge(held(current, clip.source), self.bare, known)
+        current = merge(self._held(current, known), self.bare, known)
         for span in self.spans:
             chosen = span.start, span.method == ask.method.name
             for start, stop in self.mended.get(chosen, ()):
@@ -298,6 +317,21 @@ class _Work:
         ]
         sources = provenance(known, self.spans, name, self.opinion, finished)
         return Completion(finished, lambda: raw, sources, Report(name, reports))
+
+    def _met(self, current: Clip, pinned: tuple[Pin, ...]) -> Clip:
+        """The clip with its pins met, by what its file holds of it: joints of AMC turn about fewer axes than
+        three, and what these leave over others make up for, round by round."""
+        before = np.inf
+        for _ in range(ROUNDS):
+            met = pins.meet(current, self.known, pinned, axes=self._axes)
+            current = self._held(met, self.known)
+            if current is met:
+                break
+            off = max((far / pin.tolerance for pin, _, far in pins.missed(current, pinned)), default=0.0)
+            if off <= 1.0 or off > LEFT * before:
+                break
+            before = off
+        return current
 
     def _of(self, gap: Gap) -> Span:
         return next(span for span in self.spans if span.start <= gap.start and gap.stop <= span.stop)

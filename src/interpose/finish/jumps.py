@@ -9,6 +9,7 @@ import numpy as np
 from interpose.clip import Clip, Skeleton
 from interpose.finish import feet, seams
 from interpose.finish.leading import led_over
+from interpose.finish.solve import Axes
 from interpose.finish.span import Span, write
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -194,8 +195,14 @@ def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -
     return [(lo + first, lo + last) for first, last in runs(places)]
 
 
-def soften(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> float:
-    """Bring the jumps at the seams of a span below what they may be.
+def soften(
+    current: Clip,
+    known: Observation,
+    span: Span,
+    bounds: Bounds | None,
+    axes: Axes,
+) -> float:
+    """Bring the jumps at the seams of a span below what they may be, by joints that may turn about `axes`.
 
     Returns how many times too large the largest one was, or 0 where there was nothing to do.
     """
@@ -210,6 +217,6 @@ def soften(current: Clip, known: Observation, span: Span, bounds: Bounds | None)
     if not (size > most).any() or size.max() >= KINK / current.fps:
         return 0.0
     lo, hi, inner = span.around(len(current), 2)
-    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, bounds.softened)
+    softer = seams.soften(current.slice(lo, hi), known.slice(lo, hi), inner, bounds.softened, axes)
     write(current, softer, span.start, inner)
     return float((size / most).max())

@@ -16,7 +16,7 @@ from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError, is_number
 from interpose.finish import feet
 from interpose.finish.hinges import Hinges
-from interpose.finish.solve import BLOCK, refine, refine_steadily
+from interpose.finish.solve import BLOCK, Axes, refine, refine_steadily
 from interpose.finish.windows import envelope, spread
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
@@ -150,7 +150,13 @@ def merged(pins: Iterable[Pin]) -> tuple[Pin, ...]:
     )
 
 
-def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...], down: np.ndarray | None = None) -> Clip:
+def meet(
+    clip: Clip,
+    known: Observation,
+    pins: tuple[Pin, ...],
+    down: np.ndarray | None = None,
+    axes: Axes | None = None,
+) -> Clip:
     """The clip with its pins met, as far as its bones reach.
 
     Args:
@@ -158,12 +164,13 @@ def meet(clip: Clip, known: Observation, pins: tuple[Pin, ...], down: np.ndarray
         known: what may not be changed.
         pins: as `asked`.
         down: (F, n) metres by which `feet.ends` are to be lower, as far as pins are met nevertheless.
+        axes: those about which some joints turn alone, as `formats.axes`.
     """
     if down is None:
         down = np.zeros((len(clip), len(feet.ends(clip.skeleton))))
     for (start, stop), (lo, hi), edges in _gaps(known):
         if some := [one for pin in pins if len((one := pin.slice(lo, hi)).frames)]:
-            part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges, down[lo:hi])
+            part = _meet(clip.slice(lo, hi), known.slice(lo, hi), some, edges, down[lo:hi], axes)
             rotation, translation = clip.rotation.copy(), clip.translation.copy()
             rotation[start:stop] = part.rotation[start - lo : stop - lo]
             translation[start:stop] = part.translation[start - lo : stop - lo]
@@ -231,20 +238,24 @@ def hovering(clip: Clip, known: Observation, standing: Clip) -> np.ndarray:
     return np.minimum(high, above)
 
 
-def _meet(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray) -> Clip:
+def _meet(
+    clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray, axes: Axes | None
+) -> Clip:
     placed = [pin for pin in pins if pin.position is not None]
     turned = [pin for pin in pins if pin.orientation is not None]
     # Turning a joint moves what hangs on it, so where both are asked for both are done twice.
     for _ in range(2 if placed and turned else 1):
         if placed:
-            clip = _place(clip, known, placed, edges, down)
+            clip = _place(clip, known, placed, edges, down, axes)
             down = np.zeros_like(down)
         for pin in turned:
             clip = _turn(clip, known, pin, edges)
     return clip
 
 
-def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray) -> Clip:
+def _place(
+    clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray, axes: Axes | None
+) -> Clip:
     """Bring joints to their places by turning all that is free, frame by frame."""
     skeleton = clip.skeleton
     pinned = [skeleton.index(pin.joint) for pin in pins]
@@ -278,14 +289,14 @@ def _place(clip: Clip, known: Observation, pins: list[Pin], edges: list[int], do
     heavy = [joints.index(joint) for joint in feet.ends(skeleton) if joint in joints]
     done, hinges = clip, Hinges.of(clip)
     if len(clip) <= TOGETHER:
-        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy, hinges)
+        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy, hinges, axes)
     rotation, translation = done.rotation.copy(), done.translation.copy()
     for i in range(0, len(moved), BLOCK):
         at = moved[i : i + BLOCK]
         part = done.take(at)
         seen = Observation(known.rotation[at], known.translation[at])
         rotation[at], translation[at] = _approach(
-            part, seen, joints, wanted[at], rows, heavy, hinges and hinges.at(at)
+            part, seen, joints, wanted[at], rows, heavy, hinges and hinges.at(at), axes
         )
     return clip.with_motion(rotation, translation)
 
@@ -299,6 +310,7 @@ def _steadily(
     rows: list[int],
     heavy: list[int],
     hinges: Hinges | None,
+    axes: Axes | None,
 ) -> Clip:
     """The joints in `rows` near to where they are wanted (F, n, 3), not at `start`, all frames together.
 
@@ -313,7 +325,7 @@ def _steadily(
         weights[:, rows] = 1.0
         goal = start + step * (wanted - start)
         steady, bent = STEADY * share / SHARES[0], hinges and hinges.to(HINGED * share)
-        led, done = refine_steadily(led, known, joints, goal, weights, done, steady, bent)
+        led, done = refine_steadily(led, known, joints, goal, weights, done, steady, bent, axes)
     off = [np.linalg.norm(wanted[:, rows] - p[:, rows]).sum() for p in (start, led.positions()[:, joints])]
     return led if off[1] < off[0] else clip  # what is out of reach may swing
 
@@ -326,6 +338,7 @@ def _approach(
     rows: list[int],
     heavy: list[int],
     hinges: Hinges | None,
+    axes: Axes | None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rotations and translations with which the joints in `rows` come to where they are wanted (F, n, 3).
 
@@ -347,7 +360,7 @@ def _approach(
         weights = np.full((len(clip), len(joints)), share)
         weights[:, heavy] *= FEET
         weights[:, rows] = 1.0
-        tried = refine(clip, known, joints, goal, weights, hinges and hinges.to(HINGED * share))
+        tried = refine(clip, known, joints, goal, weights, hinges and hinges.to(HINGED * share), axes)
         there = off(tried)
         nearer = np.linalg.norm(there, axis=-1).sum(axis=1) < far.sum(axis=1) - STILL
         left = np.where(nearer[:, None, None], there, left)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish.solve import refine
+from interpose.finish.solve import Axes, refine
 from interpose.geometry import measures
 from interpose.geometry.time import ease, runs
 from interpose.geometry.values import moved, offset
@@ -196,12 +196,14 @@ def soften(
     known: Observation,
     span: tuple[int, int],
     limits: Callable[[Clip, Observation, np.ndarray], np.ndarray],
+    axes: Axes,
 ) -> Clip:
     """Bring velocity jumps at the seams of the span below the limits of the joints at n observed frames (n,
     J), metres per frame squared.
 
     The first missing pose is turned, as little as possible, so that joints that jump too far go on more like
-    they did in the observed frames; within SLOPE_FADE the motion returns to its own way.
+    they did in the observed frames; within SLOPE_FADE the motion returns to its own way. Some joints
+    turn about `axes` alone: others make up for what they cannot.
     """
     at = edges(known, motion.translated, span)
     jump, most = seam_jumps(motion, known, at), limits(motion, known, at)
@@ -228,7 +230,7 @@ def soften(
         - np.where(shared[some], 0.5, 1.0)[:, None, None] * np.repeat(excess, 2, axis=0)[some]
     )
     everything = tuple(range(len(motion.skeleton)))
-    nudged = refine(poses, fresh, everything, goal, np.repeat(weights, 2, axis=0)[some])
+    nudged = refine(poses, fresh, everything, goal, np.repeat(weights, 2, axis=0)[some], axes=axes)
     row = {(int(e), int(w)): i for i, (e, w) in enumerate(zip(edge[some], way[some]))}
 
     def measure(values: Values, slots: list[int], edge: int, way: int) -> Fade:

@@ -6,7 +6,7 @@ known joint: there the rotations that the clip already has (a classical completi
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,8 @@ PULL, FAR = 1e-4, 1e-3
 STRAIGHT, BENT = 0.1, 0.35
 # Gauss-Newton: steps, frames at once, and damping in square metres (a bone's length squared is about 0.1).
 STEPS, BLOCK, DAMPING = 3, 512, 2e-3
+# See `formats.axes`.
+Axes = Callable[[Clip], dict[int, np.ndarray]]
 
 
 def solve(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
@@ -218,14 +220,16 @@ def refine(
     positions: np.ndarray,
     weights: np.ndarray | None = None,
     hinges: Hinges | None = None,
+    axes: Axes | None = None,
 ) -> Clip:
     """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
     this shares it out. Damping keeps what positions do not tell. `weights` (F, n), or (F, n, 3) by axis, says
     how much each position counts; default: all the same. `hinges` hold knees and elbows to how they bend.
+    `axes` says about which some joints turn alone.
     """
-    freedom = Freedom.of(clip, observation, joints, hinges)
+    freedom = Freedom.of(clip, observation, joints, hinges, axes)
     for _ in range(STEPS):
         normal, towards, frame = freedom.normal(clip, positions, weights)
         normal += DAMPING * np.eye(normal.shape[2])
@@ -242,18 +246,19 @@ def refine_steadily(
     done: np.ndarray,
     steady: float,
     hinges: Hinges | None = None,
+    axes: Axes | None = None,
 ) -> tuple[Clip, np.ndarray]:
     """As `refine`, of all frames together: what is done to the motion changes evenly over time.
 
     Args:
-        clip, observation, joints, positions, weights, hinges: as in `refine`.
+        clip, observation, joints, positions, weights, hinges, axes: as in `refine`.
         done: (F, d) what has been done to the motion already, as it came from here; zeros (F, 1) at first.
         steady: how much the second differences of what is done count, squared, against metres squared.
 
     Returns:
         The clip, and what has been done to it by now.
     """
-    freedom = Freedom.of(clip, observation, joints, hinges)
+    freedom = Freedom.of(clip, observation, joints, hinges, axes)
     frames, size = freedom.free.shape
     even = steady * bending(frames)
     for _ in range(STEPS):
@@ -287,6 +292,7 @@ class Freedom:
         above: (n, movable) 1 where the known joint hangs below the one that may turn.
         by_shift: (3 n, 3 carriers) how much a shift of each carrier along each axis moves each known joint.
         hinges: what pulls knees and elbows back that turn otherwise than by bending.
+        axes: of a clip the joints that turn about fewer than three axes, as `formats.axes`.
     """
 
     known: list[int]
@@ -296,10 +302,16 @@ class Freedom:
     above: np.ndarray
     by_shift: np.ndarray
     hinges: Hinges | None = None
+    axes: Axes | None = None
 
     @classmethod
     def of(
-        cls, clip: Clip, observation: Observation, joints: tuple[int, ...], hinges: Hinges | None = None
+        cls,
+        clip: Clip,
+        observation: Observation,
+        joints: tuple[int, ...],
+        hinges: Hinges | None = None,
+        axes: Axes | None = None,
     ) -> Freedom:
         """Of what is not observed."""
         skeleton, known = clip.skeleton, list(joints)
@@ -310,7 +322,7 @@ class Freedom:
         free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
         carried = skeleton.below[np.ix_(known, carriers)]
         by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
-        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, hinges)
+        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, hinges, axes)
 
     def normal(
         self, clip: Clip, positions: np.ndarray, weights: np.ndarray | None
@@ -324,6 +336,12 @@ class Freedom:
         by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], 2)
         by_turn = by_turn.reshape(frames, 3 * len(self.known), 3 * len(self.movable))
         by_shift = np.broadcast_to(self.by_shift, (frames, *self.by_shift.shape))
+        for joint, about in self.axes(clip).items() if self.axes else ():
+            if joint in self.movable:
+                parent = clip.skeleton.parents[joint]
+                world = about if parent < 0 else rotations.to_matrix(turned[:, parent]) @ about
+                column = 3 * self.movable.index(joint)
+                by_turn[..., column : column + 3] @= world @ np.swapaxes(world, -1, -2)
         jacobian = np.concatenate([by_turn, by_shift], axis=2) * self.free[:, None]
         miss = (positions - placed[:, self.known]).reshape(frames, -1, 1)
         if weights is None:

@@ -8,6 +8,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from interpose.clip import Clip
 from interpose.errors import FileError, RequestError, unfit
 from interpose.formats import asf_amc, bvh, npz
@@ -94,6 +96,14 @@ def held(clip: Clip, source: Any) -> Clip:
     if not isinstance(source, asf_amc.AmcSource) or source.skeleton.parents != clip.skeleton.parents:
         return clip
     return clip.with_motion(source.layout.held(clip.rotation, clip.skeleton.parents), clip.translation)
+
+
+def axes(clip: Clip, source: Any) -> dict[int, np.ndarray]:
+    """The axes of joints that turn about fewer than three in a file as in `held`: of each (F, 3, k) unit
+    vectors in the axes of its parent, as the joints above and its own first turns have them."""
+    if not isinstance(source, asf_amc.AmcSource) or source.skeleton.parents != clip.skeleton.parents:
+        return {}
+    return source.layout.axes(clip.rotation)
 
 
 def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:

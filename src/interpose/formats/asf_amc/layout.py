@@ -109,6 +109,25 @@ class Layout:
         turned = rotations.multiply(rotations.multiply(self.before, own), self.after)
         return place.rotations_inside(turned, self.up)
 
+    def axes(self, rotation: np.ndarray) -> dict[int, np.ndarray]:
+        """The axes about which joints turn that have fewer than three, (n, 3, k) unit vectors in the axes of
+        the joint's parent, where the clip's rotations are (n, J, 4)."""
+        found, own = {}, self.own_rotations(rotation)
+        for joint, (order, columns) in enumerate(zip(self.orders, self.rotation_columns)):
+            if (count := int((columns >= 0).sum())) == 3:
+                continue
+            turns, _ = angles.nearest(own[:, joint], order, count)
+            above, about = (
+                np.tile(self.before[joint], (len(rotation), 1)),
+                np.empty((len(rotation), count, 3)),
+            )
+            for k, axis in enumerate(order[:count]):
+                unit = np.eye(3)[rotations.AXES.index(axis)]
+                about[:, k] = rotations.rotate(above, unit)
+                above = rotations.multiply(above, rotations.exp(np.radians(turns[:, k, None]) * unit))
+            found[joint] = np.swapaxes(place.vectors_inside(about, 1.0, self.up), -1, -2)
+        return found
+
     def moved(self, values: np.ndarray, translation: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The numbers (n, T) in the columns `moving` that give translations (n, K, 3) in metres, Y up.
 
