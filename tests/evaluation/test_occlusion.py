@@ -102,7 +102,7 @@ def test_as_few_frames_as_in_the_paper(published):
         occlusion.networks([card], 30)
     assert "--fps 5" in error.value.fix
     result = occlusion.run(published, most=1, networks=rows)
-    assert result.rows == ("linear", "kalman", "STMI-GAN, paper", "STMI-GAN, paper, mirrored too")
+    assert result.rows == ("linear", "kalman", "STMI-GAN, paper", "STMI-GAN, paper, as users get it")
     assert result.to_dict()["rate"] == 5
     assert result.to_dict()["hidden"][occlusion.FRAMES_GONE] == pytest.approx(14 / 18)
     assert result.ratio("all", occlusion.JOINTS_GONE, "STMI-GAN, paper") < 0.7

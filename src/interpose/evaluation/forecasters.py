@@ -129,8 +129,9 @@ def seq2seq(card: Card) -> Forecaster:
     return forecast
 
 
-def inpainting(card: Card) -> Forecaster:
-    """STMI-GAN, at the frame rate of its network: window by window, each going on from the one before."""
+def inpainting(card: Card, settled: bool = False) -> Forecaster:
+    """STMI-GAN, at the frame rate of its network: window by window, each going on from the one before. Its
+    own motion, as in the paper, or `settled` into what was seen, which is how users get it."""
 
     def forecast(seen: Motions, seed: int) -> np.ndarray:
         frames, rng = card.training["network"]["frames"], np.random.default_rng(seed)
@@ -141,7 +142,7 @@ def inpainting(card: Card) -> Forecaster:
         while motion.shape[1] < length:
             window = np.pad(motion[:, -known:], ((0, 0), (0, frames - known), (0, 0), (0, 0)))
             parts = (window[at : at + BATCH] for at in range(0, len(window), BATCH))
-            made = [stmi_gan.run(card, part, observed[: len(part)], rng)[1] for part in parts]
+            made = [stmi_gan.run(card, part, observed[: len(part)], rng)[int(settled)] for part in parts]
             motion = np.concatenate([motion, np.concatenate(made)[:, known:]], axis=1)
         return motion[:, round(card.fps * SEEN / FPS) : length]
 
