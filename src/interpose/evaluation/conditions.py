@@ -235,7 +235,8 @@ def hdm05(
     """Table 4's columns of MPI-HDM05: L2P and L2Q between two keys, both counted, on the canonical body.
 
     The weights have seen nothing of this data set, unlike the paper's, which trained on three of its
-    performers; of those come mean and deviation of positions. Cuts are short: there are few long ones.
+    performers (bk, dg and mm). Mean and deviation of positions are of those of the split "train" here, bd, bk
+    and dg, as mm is for validation. Cuts are short: there are few long ones.
     """
     known = [
         cut.see(cut.clip)[0] for cut in _cuts(datasets.clips("hdm05", data, "train"), SHORT[0], progress)
