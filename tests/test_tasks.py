@@ -857,10 +857,17 @@ def test_the_beginning_of_a_clip_is_said_as_firmly_as_its_end(cmu_walk, monkeypa
 def test_frames_of_points_between_poses_count_from_the_first_in_what_is_said(cmu_walk):
     start, target = cmu_walk.slice(0, 60), cmu_walk.slice(100, 160)
     hand = Pin("LeftHand", np.array([45]), np.zeros((1, 3)))
+    inside = replace(hand, frames=np.array([7]))
     for asked in ({"path": {40: (0.0, 0.0)}}, {"path": {-3: (0.0, 0.0)}}, {"pins": [hand]}):
         frame = 45 if "pins" in asked else next(iter(asked["path"]))
         with pytest.raises(RequestError, match=f"at frame {frame}"):
             tasks.pose_to_pose(start, target, 30, method="spline", **asked)
+    for pins, frame in (
+        ((replace(hand, frames=np.array([0])),), 0),
+        ((inside, replace(inside, position=hand.position + 9.0)), 7),
+    ):
+        with pytest.raises(RequestError, match=f"pinned (to two places )?at frame {frame}"):
+            tasks.pose_to_pose(start, target, 30, method="spline", pins=pins)
 
 
 def test_a_folder_of_the_name_of_a_method_is_a_folder(cmu_walk, tmp_path, monkeypatch):

@@ -44,8 +44,10 @@ AT_MOST = 20
 STEADY, TOGETHER = 1.0, 2000
 
 
-def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
+def asked(clip: Clip, observation: Observation, first: int = 0) -> tuple[Pin, ...]:
     """What pins ask for, `merged`: a joint that is held over a key is known there, as it is to be.
+
+    `first` is the number by which errors call the first frame.
 
     Raises RequestError for pins of joints or frames that are not there, of values that are known and other
     ones, or that say nothing.
@@ -85,8 +87,8 @@ def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
         outside = (frames < 0) | (frames >= len(clip))
         if outside.any():
             raise RequestError(
-                f"there is no frame {frames[outside][0]} for the pin of {pin.joint}",
-                f"the clip has {len(clip)} frames, counted from 0",
+                f"there is no frame {first + frames[outside][0]} for the pin of {pin.joint}",
+                f"the clip has {len(clip)} frames, counted from {first}",
                 "Pin frames inside of a gap.",
             )
         if pin.orientation is not None and np.linalg.norm(pin.orientation, axis=1).min() < 1e-6:
@@ -109,7 +111,7 @@ def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
                 other = rotations.angle(here[0][:, joint], rotations.normalize(np.asarray(values))) > TURNED
             if (wrong := told & (other | ~tells[kind][frames, joint])).any():
                 raise RequestError(
-                    f"{pin.joint} cannot be pinned at frame {frames[wrong][0]}",
+                    f"{pin.joint} cannot be pinned at frame {first + frames[wrong][0]}",
                     "where it is, or how it is turned, follows from what is observed, which comes back "
                     "unchanged",
                     "Pin frames inside of a gap, of joints that are missing in it or hang on one that is.",
@@ -123,7 +125,7 @@ def asked(clip: Clip, observation: Observation) -> tuple[Pin, ...]:
             other = places.setdefault((pin.joint, int(frame)), np.asarray(place))
             if (apart := float(np.linalg.norm(place - other))) > pin.tolerance:
                 raise RequestError(
-                    f"{pin.joint} is pinned to two places at frame {frame}",
+                    f"{pin.joint} is pinned to two places at frame {first + frame}",
                     f"they are {100 * apart:.1f} cm apart, and it can be at one of them",
                     "Leave one of the pins out.",
                 )

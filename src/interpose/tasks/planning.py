@@ -9,7 +9,6 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError, is_number
-from interpose.finish import pins as pinning
 from interpose.geometry.time import runs
 from interpose.methods import auto, registry
 from interpose.methods.classical import Spline
@@ -37,8 +36,7 @@ def plan(
     action: str = "",
     temperature: float = 1.0,
 ) -> list[Job]:
-    """The runs of incomplete frames, numbered in order of time, each with its method; pins are checked."""
-    pinning.asked(clip, observation)
+    """The runs of incomplete frames, numbered in order of time, each with its method."""
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
     wanted = (
         range(1, len(spans) + 1) if only is None else list(only) if isinstance(only, Iterable) else [only]
