@@ -870,6 +870,19 @@ def test_frames_of_points_between_poses_count_from_the_first_in_what_is_said(cmu
             tasks.pose_to_pose(start, target, 30, method="spline", pins=pins)
 
 
+def test_what_is_no_body_is_said_of_forecasts_and_gets_no_advice_that_does_not_help(cmu_walk):
+    odd = tuple(f"bone{i}" for i in range(len(cmu_walk.skeleton)))
+    flat = np.abs(cmu_walk.skeleton.rest_translation) * [1.0, 0.0, 0.0]
+    strange = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, names=odd, rest_translation=flat))
+    (gap,) = tasks.forecast(strange, 10).report.gaps
+    assert "humanoids only" in " ".join(gap.notes)
+    for clip, joint, helps in ((strange, odd[-1], False), (cmu_walk, "LeftForeArm", True)):
+        known = Observation.from_gaps(clip, [Gap(0, len(clip), (joint,))])
+        (gap,) = tasks.fill(clip, known, "spline").report.gaps
+        (said,) = [note for note in gap.notes if "only the rest pose to say" in note]
+        assert ("The method base tells it" in said) is helps
+
+
 def test_a_folder_of_the_name_of_a_method_is_a_folder(cmu_walk, tmp_path, monkeypatch):
     shutil.copytree(weights.find("small-open").onnx.parent, tmp_path / "small")
     monkeypatch.chdir(tmp_path)

@@ -615,12 +615,24 @@ def test_a_layer_of_nothing_is_refused(run, take):
     assert "--from" in done.err
 
 
-def test_a_report_of_a_clip_of_other_frames_is_refused(run, take):
-    """As that of two poses, which names the file of the first: its gap is in what was made of them."""
-    assert run("between", "--start", "take.bvh#20", "--target", "take.bvh#60", "--frames", "20").code == 0
-    done = run("fill", "take.bvh", "--gaps", "take.between.json")
+def test_a_report_of_poses_of_several_files_is_refused(run, take):
+    """Though the first of them has as many frames as what was made."""
+    frames = ("--frames", str(len(load(take)) - 2))
+    assert (
+        run("between", "--start", "take.bvh", "--target", "take.bvh", *frames, "--method", "spline").code == 0
+    )
+    done = run("fill", "take.bvh", "--gaps", "take.between.json", "-o", "again.bvh")
     assert done.code == 2
-    assert "it is of a clip of 22 frames" in done.err
+    assert "Run interpose between again" in done.err
+    assert not take.with_name("again.bvh").exists()
+
+
+def test_a_report_of_a_clip_of_other_frames_is_refused(run, take):
+    save(load(take).slice(0, 120), take.with_name("cut.bvh"))
+    assert run("fill", "cut.bvh", "--gap", "60:90", "--method", "spline").code == 0
+    done = run("fill", "take.bvh", "--gaps", "cut.filled.json")
+    assert done.code == 2
+    assert "it is of a clip of 120 frames" in done.err
 
 
 def test_whose_weights_they_are_is_said(run, take):

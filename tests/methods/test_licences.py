@@ -87,28 +87,72 @@ def test_every_verb_that_generates_explains_it(verb, capsys):
     assert "open to use only weights that may be used for anything" in said
 
 
-def test_without_weights_for_research(walk, monkeypatch, tmp_path):
-    """As with the wheel alone: open weights, inside of the package, stand in."""
+@pytest.fixture
+def wheel_alone(monkeypatch, tmp_path):
+    """Open weights, inside of the package, and no others."""
     inside = tmp_path / "inside"
     inside.mkdir()
     (inside / "small-open").symlink_to(ROOT / "weights" / "small-open", target_is_directory=True)
     monkeypatch.setattr(weights, "FOLDERS", (tmp_path / "no checkout", inside))
     weights.cards.cache_clear()
-    try:
-        assert [card.name for card in weights.cards()] == ["small-open"]
-        assert auto.choose(walk, second(walk), lone=2)[0].name == "small-open"
-        with pytest.raises(RequestError, match="no weights for the method cae") as error:
-            interpose.fill(walk, second(walk), method="cae")
-        assert "pip install ./weights" in error.value.fix
-        # Beside them the distribution for research, as a package that is only a folder.
-        package = tmp_path / "site" / weights.RESEARCH
-        package.mkdir(parents=True)
-        (package / "cae").symlink_to(ROOT / "weights" / "cae", target_is_directory=True)
-        monkeypatch.syspath_prepend(tmp_path / "site")
-        weights.cards.cache_clear()
-        assert [card.name for card in weights.cards()] == ["cae", "small-open"]
-    finally:
-        weights.cards.cache_clear()
+    yield
+    weights.cards.cache_clear()
+
+
+def test_without_weights_for_research(walk, monkeypatch, tmp_path, wheel_alone):
+    """Open weights stand in."""
+    assert [card.name for card in weights.cards()] == ["small-open"]
+    assert auto.choose(walk, second(walk), lone=2)[0].name == "small-open"
+    with pytest.raises(RequestError, match="no weights for the method cae") as error:
+        interpose.fill(walk, second(walk), method="cae")
+    assert "pip install ./weights" in error.value.fix
+    with pytest.raises(RequestError, match="unknown model: small") as error:
+        weights.card("small")
+    assert "pip install ./weights" in error.value.fix
+    # Beside them the distribution for research, as a package that is only a folder.
+    package = tmp_path / "site" / weights.RESEARCH
+    package.mkdir(parents=True)
+    (package / "cae").symlink_to(ROOT / "weights" / "cae", target_is_directory=True)
+    monkeypatch.syspath_prepend(tmp_path / "site")
+    weights.cards.cache_clear()
+    assert [card.name for card in weights.cards()] == ["cae", "small-open"]
+    with pytest.raises(RequestError, match="unknown model") as error:
+        weights.card("other")
+    assert "pip install" not in error.value.fix
+
+
+def test_what_is_not_installed_is_said_of_models(capsys, wheel_alone):
+    assert main(["models", "base"]) == 0
+    assert "pip install ./weights" in capsys.readouterr().out
+    assert main(["models", "spline"]) == 0
+    assert "no trained weights" in capsys.readouterr().out
+    main(["models"])
+    assert "what measured best: small-open, and for gaps of less than 2" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("options", [["--license", "open"], []])
+def test_what_is_compared_where_nothing_is_named_is_what_may_be_used(options, request, tmp_path, capsys):
+    if not options:
+        request.getfixturevalue("wheel_alone")
+    page = tmp_path / "page.html"
+    take = [str(DATA / "cmu_walk.bvh"), "--gap", "60:70", "--joints", "LeftArm", "-o", str(page)]
+    assert main(["compare", *take, *options]) == 0
+    said = capsys.readouterr().out
+    assert "small-open" in said
+    assert "spline" in said
+    assert "cae" not in said
+
+
+@pytest.mark.parametrize("method", [[], ["--method", "spline"]])
+def test_where_nothing_may_be_used_that_knows_actions_nothing_is_advised(method, capsys):
+    keys = ["between", str(DATA / "cmu_walk.bvh"), "--keys", "0,30", "--action", "walk", *method]
+    assert main([*keys, "--license", "open"]) == 2
+    said = capsys.readouterr().err
+    assert "no method knows actions whose weights are installed, and may be used" in said
+    assert "Use" not in said
+    forecast = ["forecast", str(DATA / "cmu_walk.bvh"), "--samples", "3", "--license", "open"]
+    assert main(forecast) == 2
+    assert "no method has more than one answer" in capsys.readouterr().err
 
 
 def test_the_wheels_carry_what_their_licences_allow():

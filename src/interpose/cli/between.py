@@ -117,6 +117,7 @@ def between(
         clip = done.clip
     retargeted = [str(path) for path, other in others.items() if other]
     more: dict[str, Any] = {"retargeted": retargeted} if retargeted else {}
+    more |= {"poses": [start, target, *anchor]} if laid else {}
     more |= {"path": path} if path else {}
     more |= {"pinned": pin} if pin else {}
     told: dict[str, Any] = {"json": json, "force": force, "more": more, "read": read}

@@ -55,7 +55,8 @@ def compare(
         gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip.
         gaps: a JSON file of gaps.
-        methods: the methods, separated by commas; without it spline, base, small, cae and cmib.
+        methods: the methods, separated by commas; without it spline, base, small, cae and cmib, or of
+            them those that are installed and may be used, and small-open where no other network is.
             `interpose models` lists what there is.
         output: where to write the page.
         license: open to use only weights that may be used for anything; any (the default).
@@ -67,7 +68,7 @@ def compare(
     from interpose.cli.request import check_method, from_options, path_of, pins_of
     from interpose.observation import Observation
 
-    chosen = list(dict.fromkeys(split_names(methods) or USUAL))
+    chosen = list(dict.fromkeys(split_names(methods) or _usual(license)))
     if len(chosen) > len(COLORS):
         raise RequestError(
             f"cannot compare {len(chosen)} methods",
@@ -127,6 +128,24 @@ def compare(
     which = f"--gaps {quote(str(gaps))}" if gaps else which
     say(f"interpose fill {quote(str(file))} {which} --method NAME writes one of them.".replace("  ", " "))
     return 0
+
+
+def _usual(license: str) -> list[str]:
+    """What is compared where nothing is named: what may be used of what is usual."""
+    from interpose.cli.request import check_method
+    from interpose.methods import weights
+
+    weights.allow(license)
+
+    def usable(name: str) -> bool:
+        try:
+            check_method(name, license)
+        except RequestError:
+            return False
+        return True
+
+    found = [name for name in USUAL if usable(name)]
+    return found if len(found) > 1 else [*found, *filter(usable, ["small-open"])]
 
 
 def _check(page: Path, force: bool) -> None:

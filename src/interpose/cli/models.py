@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from interpose.methods.weights import Card
 
 METHODS = {
-    "auto": "what measured best: base, and for gaps of a single frame the spline",
     "zero-velocity": "holds the last pose",
     "linear": "straight line between the poses on both sides",
     "kalman": "low-rank Kalman smoothing: joints that move together tell where a lost limb is",
@@ -40,12 +39,15 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
     from interpose.methods import registry, weights
 
     names = dict.fromkeys(["auto", *registry.names()])
+    told = {one: METHODS.get(one, "from another package") for one in names} | {"auto": _auto()}
     if name in names and name not in [card.name for card in weights.cards()]:
-        what = METHODS.get(name, "from another package")
         if json:
-            say_json({"name": name, "description": what})
-        else:
-            say(f"{name}: {what}\nIt has no trained weights, and so no card.")
+            say_json({"name": name, "description": told[name]})
+            return
+        lacks = name != "auto" and hasattr(registry.get(name), "trained")
+        there = "no trained weights, and so no card"
+        where = "weights for research, which are not installed: pip install ./weights"
+        say(f"{name}: {told[name]}\nIt has {where if lacks else there}.")
         return
     if name is not None:
         said = _said(weights.card(name))
@@ -56,10 +58,10 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
         return
     cards = weights.cards()
     if json:
-        methods = [{"name": one, "description": METHODS.get(one, "from another package")} for one in names]
+        methods = [{"name": one, "description": what} for one, what in told.items()]
         say_json({"methods": methods, "models": [_said(card) for card in cards]})
         return
-    say_table(("method", "what it does"), [(one, METHODS.get(one, "from another package")) for one in names])
+    say_table(("method", "what it does"), [*told.items()])
     say()
     if not cards:
         say("No trained models are installed: auto uses the spline.")
@@ -81,6 +83,19 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
     )
     say()
     say(f"interpose models {cards[0].name} prints the whole card.")
+
+
+def _auto() -> str:
+    """What `auto` takes of what is installed."""
+    from interpose.methods import auto, registry, weights
+
+    found = registry.usable(auto.NETWORKS)
+    if not found:
+        return "what measured best of what is installed: the spline"
+    card = weights.find(found[0])
+    from_gap = card.auto["from_gap"]
+    brief = "a single frame" if from_gap <= 2 else f"less than {from_gap / card.fps:g} seconds"
+    return f"what measured best: {found[0]}, and for gaps of {brief} the spline"
 
 
 def _said(card: Card) -> dict[str, Any]:

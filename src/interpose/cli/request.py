@@ -106,6 +106,9 @@ def from_options(
         if is_report(content) and any(map(content.get, ("place", "moments", "exchanged"))):
             why = f"{gaps} is of recover, which restored what is no gap"
             raise RequestError("this report cannot be repeated", why, "Run interpose recover again.")
+        if is_report(content) and content.get("poses"):
+            why = f"{gaps} is of poses of several files, between which a clip of its own was made"
+            raise RequestError("this report cannot be repeated", why, "Run interpose between again.")
         if is_report(content) and content.get("frames", len(clip)) != len(clip):
             why = f"it is of a clip of {content['frames']} frames, and {file} has {len(clip)}"
             fix = f"Repeat it on {content.get('input', 'its own clip')}, or name the gaps with --gap."

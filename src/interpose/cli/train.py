@@ -141,7 +141,8 @@ def own(
     Args:
         data: the folder with your clips.
         from_: the weights to begin with: small, base, small-open, or a folder.
-        out: the folder for the new weights; the run goes into a folder within it, and goes on if it is there.
+        out: the folder for the new weights. The run goes into a folder within it: one that was interrupted
+            goes on, one that is finished is not replaced.
         budget: device time or steps: 10m, 1h, 2000steps.
         set: change a setting of the recipe: name=value. May be repeated.
     """
@@ -204,7 +205,8 @@ def own(
     say_table(("gap", "before", "after"), rows, right=("before", "after"))
     say("mean error of joints in the part held out, cm on a body with a leg of 0.86 m")
     if after["gap30"] >= before["gap30"]:
-        say("It is no better: more takes, or a smaller --set learning_rate=2e-4, may help.")
+        gentler = f"--set learning_rate={settings.learning_rate / 5:g}"
+        say(f"It is no better: more takes, or {gentler} into another --out, may help.")
     say()
     say(f"wrote {out}: interpose fill TAKE.bvh --method {out}")
 

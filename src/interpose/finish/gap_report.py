@@ -81,7 +81,7 @@ def gap_report(
             *([] if bounds else notes.wild(finished, known, gap, first)),
             *notes.doubtful(risk, finished, gap, first),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
-            *notes.rests(never, span.method),
+            *notes.rests(never, span.method, skeleton),
             *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
         ),
     )

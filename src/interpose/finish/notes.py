@@ -13,6 +13,8 @@ from interpose.finish import anatomy, feet, floor, jumps, seams
 from interpose.finish.windows import grow
 from interpose.geometry import measures
 from interpose.geometry.time import runs
+from interpose.methods import registry
+from interpose.methods.bodies import no_humanoid
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
@@ -290,14 +292,16 @@ def never(known: Observation, gap: Gap, names: tuple[str, ...]) -> list[str]:
     return [name for name in gap.joints or () if not known.rotation[:, names.index(name)].any()]
 
 
-def rests(joints: list[str], method: str) -> list[str]:
-    """A note where nothing of some joints is `never` known."""
+def rests(joints: list[str], method: str, skeleton: Skeleton) -> list[str]:
+    """A note where nothing of some joints is `never` known; of a body, which method would know more."""
     if not joints:
         return []
-    return [
-        f"flagged: nothing of {few(joints)} is known at any frame, and {method} has only the rest pose to "
-        "say. The method base tells it from the other joints"
-    ]
+    others = [] if no_humanoid(find_mapping(skeleton)) else registry.usable(("base", "small", "small-open"))
+    tells = f". The method {others[0]} tells it from the other joints" if others else ""
+    said = (
+        f"flagged: nothing of {few(joints)} is known at any frame, and {method} has only the rest pose to say"
+    )
+    return [said + tells]
 
 
 def scant(known: Observation, gap: Gap, fps: float) -> list[str]:

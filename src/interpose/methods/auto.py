@@ -66,7 +66,8 @@ def choose_told(clip: Clip, gap: Gap, action: str) -> Method:
     Raises RequestError for an action that none of them knows, or where none is installed.
     """
     methods: list[Method] = []
-    for name in ("base", "small", "cmib"):
+    said = registry.nobody(f"cannot make it {action}", "knows actions")
+    for name in registry.usable(("base", "small", "cmib")):
         try:
             methods.append(registry.told(name, action))
         except RequestError as error:

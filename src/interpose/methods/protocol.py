@@ -22,9 +22,9 @@ class Raw:
 
     Attributes:
         clip: the completion on the clip's own skeleton.
-        positions: (F, J, 3) global joint positions for methods that speak positions, on the joints in
+        positions: (F, n, 3) global joint positions for methods that speak positions, of the n joints in
             `joints`; None for methods that speak rotations.
-        joints: indices of the joints that `positions` speaks of.
+        joints: indices of the joints that `positions` speaks of: given with them.
         notes: what a report should say (drift of the root trajectory, model, ...).
         own: (F, J, 3) a network's own poses in the body's frame (hips over the origin, facing along Z),
             before they are settled into what is observed: the papers' tables lay them on the true way.

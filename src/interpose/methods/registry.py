@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from importlib import import_module
@@ -128,11 +129,11 @@ def acting(method: Method, action: str) -> Method:
     if not action:
         return method
     if not isinstance(method, Actor):
-        raise RequestError(
-            f"cannot make it {action} with {method.name}",
-            f"{method.name} knows no actions",
-            "Use the method base or cmib.",
-        )
+        what = f"cannot make it {action} with {method.name}"
+        if not (others := usable(("base", "cmib"))):
+            raise nobody(what, "knows actions")
+        why = f"{method.name} knows no actions"
+        raise RequestError(what, why, f"Use the method {' or '.join(others)}.")
     return method.for_action(action)
 
 
@@ -147,11 +148,26 @@ def warmed(method: Method, temperature: float) -> Method:
 
 def one_answer(what: str) -> RequestError:
     """That a method has one answer only, and which ones have more."""
-    others = [name for name in METHODS if isinstance(get(name), Sampler)]
+    others = usable(tuple(name for name in METHODS if isinstance(get(name), Sampler)))
+    if not others:
+        return nobody(what, "has more than one answer")
+    return RequestError(what, "it has one answer only", f"Use the method {' or '.join(others)}.")
+
+
+def usable(names: tuple[str, ...]) -> list[str]:
+    """Those of some methods with weights of which these are installed, and may be used."""
+    found = []
+    for name in names:
+        with suppress(RequestError):
+            weights.find(name)
+            found.append(name)
+    return found
+
+
+def nobody(what: str, does: str) -> RequestError:
+    """That no method does something whose weights are installed, and may be used."""
     return RequestError(
         what,
-        "it has one answer only",
-        f"Use the method {' or '.join(others)}."
-        if others
-        else "No method that is installed draws samples yet.",
+        f"no method {does} whose weights are installed, and may be used",
+        "Leave that out; or install those for research (pip install ./weights) and allow any licence.",
     )

@@ -177,6 +177,11 @@ def folders() -> list[Path]:
     return [folder for folder in (*FOLDERS[1:], *places) if folder.is_dir()]
 
 
+def all_installed() -> bool:
+    """Whether weights for research are there, too."""
+    return FOLDERS[0].is_dir() or find_spec(RESEARCH) is not None
+
+
 @cache
 def cards() -> list[Card]:
     """The cards of all installed weights, by name."""
@@ -283,7 +288,9 @@ def card(name: str) -> Card:
         if known.name == name:
             return known
     if not (name and Path(name).is_dir()):
-        raise unknown("model", name, [known.name for known in cards()])
+        error = unknown("model", name, [known.name for known in cards()])
+        more = "" if all_installed() else " Those for research are installed by: pip install ./weights."
+        raise RequestError(error.what, error.why, error.fix + more)
     return within(name)
 
 

@@ -12,7 +12,6 @@ from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Provenance, Report, anatomy, complete, on_rig_of, seams
 from interpose.finish.path import spans
-from interpose.finish.pins import asked as check_pins
 from interpose.finish.retargeting import common
 from interpose.geometry.time import resample
 from interpose.methods import auto, registry
@@ -96,8 +95,7 @@ def fill(
     points, whole = _points(path or {}), _Whole(clip, observation)
     clip = _handed(clip, observation)
     spans(clip, observation, points)
-    check_pins(clip, observation, -zero)
-    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature)
+    jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature, zero)
     _check_open(jobs, points)
     # Of all of the take: a window of it tells less of how it moves.
     limits = seams.limits(clip, observation) if any(job.method for job in jobs) else None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -112,7 +112,16 @@ def forecast(
                 "Ask for one: its report says why.",
             )
         done.append(one)
+    if job.note:
+        # Why it is no network's, which this was to be.
+        done = [_noted(one, job.note) for one in done]
     first = done[0]
     made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
     made.samples.extend([made, *done[1:]])
     return made
+
+
+def _noted(done: Completion, note: str) -> Completion:
+    """With one more note of its gap."""
+    gaps = [replace(gap, notes=(note, *gap.notes)) for gap in done.report.gaps]
+    return replace(done, report=replace(done.report, gaps=gaps))

@@ -9,6 +9,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError, is_number
+from interpose.finish import pins as pinning
 from interpose.geometry.time import runs
 from interpose.methods import auto, registry
 from interpose.methods.classical import Spline
@@ -35,8 +36,10 @@ def plan(
     methods: Mapping[int, str | Method],
     action: str = "",
     temperature: float = 1.0,
+    zero: int = 0,
 ) -> list[Job]:
-    """The runs of incomplete frames, numbered in order of time, each with its method."""
+    """The runs of incomplete frames, numbered in order of time, each with its method; pins are checked."""
+    pinning.asked(clip, observation, -zero)
     spans = [_span(observation, clip, start, stop) for start, stop in runs(~observation.frames)]
     wanted = (
         range(1, len(spans) + 1) if only is None else list(only) if isinstance(only, Iterable) else [only]
@@ -45,8 +48,8 @@ def plan(
         if not is_number(number, 1, len(spans), whole=True):
             raise RequestError(
                 f"there is no gap number {str(number)[:40]}",
-                f"the clip has {len(spans)} gaps, counted from 1 in order of time",
-                "A dry run (--dry-run) lists them; in Python report.gaps and report.open do.",
+                f"the clip has {len(spans)} gap{'s' * (len(spans) != 1)}, counted from 1 in order of time",
+                "Leave the number out: a dry run (--dry-run) lists them then; in Python the report does.",
             )
     jobs = []
     for number, gap in enumerate(spans, 1):

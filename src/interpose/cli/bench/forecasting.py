@@ -25,7 +25,9 @@ def forecasting(
 
     Entropies of power spectra, and how far these are from real motion's, second by
     second; distances to the truth, and diversity. Weights of STMI-GAN are a row
-    where they are installed, and so are those of each folder named.
+    where they are installed, and so are those of each folder named: what the network
+    says itself, as in the paper, and once more settled into what was seen, as users
+    get it.
 
     Try:
       interpose bench forecasting --data data --split test
@@ -61,7 +63,9 @@ def occlusion(
     """Hernandez Ruiz et al. 2019, table 3: joint error where 80 % of joints, limbs, frames or values is lost.
 
     Joints and limbs are lost for a whole clip of 4 s, as in the public code of the
-    paper, and frame by frame, as its caption says.
+    paper, and frame by frame, as its caption says. Of STMI-GAN one row is what the
+    network says itself, as in the paper, and one what users get: settled into what
+    is known, in the mean with its mirror image.
 
     Try:
       interpose bench occlusion --data data --split test
