@@ -27,6 +27,7 @@ from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.methods import base, registry, weights
 from interpose.observation import Gap, Observation, Pin, timeline
+from interpose.observation.scan import intact
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 from interpose.tasks import filling, stitching, windows
@@ -570,6 +571,22 @@ def test_a_rest_pose_that_leads_a_file_is_no_lost_joints(cmu_walk):
         ("LeftForeArm", f"{frame}:{frame + 1}") for frame in range(10, 70, 7)
     }
     assert np.array_equal(done.clip.rotation[0], rotation[0])
+
+
+def test_of_a_pose_that_falls_to_rest_every_joint_is_recovered(cmu_walk):
+    """A knee that is nearly straight beside it does not snap."""
+    rest, knee = cmu_walk.skeleton.rest_rotation, cmu_walk.skeleton.index("LeftLeg")
+    rotation = cmu_walk.rotation.copy()
+    straight = 0.93 * np.exp(-(((np.arange(len(cmu_walk)) - 55) / 20) ** 2))
+    rotation[:, knee] = rotations.exp((1 - straight)[:, None] * rotations.log(rotation[:, knee]))
+    sound = cmu_walk.with_motion(rotation.copy(), cmu_walk.translation)
+    rotation[50:60] = rest
+    fallen = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    assert intact(fallen).rotation[50:60, knee].any()
+    done = tasks.recover(fallen)
+    assert rotations.angle(done.clip.rotation[50:60, knee], rest[knee]).min() > 0.01
+    off = rotations.angle(done.clip.rotation[50:60, knee], sound.rotation[50:60, knee])
+    assert off.max() < 0.1
 
 
 def test_only_frames_asked_for_are_recovered(cmu_walk):

@@ -146,6 +146,32 @@ def test_a_report_is_replayed_to_the_same_bytes(run, take):
     assert mine | {"output": ""} == theirs | {"output": ""}
 
 
+def test_all_turns_lost_are_not_the_whole_pose_in_a_report_and_its_replay(run, take):
+    """Where the body is stays known: on the command line joints are rotations alone."""
+    names = load(take).skeleton.names
+    every = ("--gap", "60:100", "--joints", ",".join(names), "--method", "spline")
+    done = run("fill", "take.bvh", *every, "--json").json
+    assert done["gaps"][0]["joints"] == list(names)
+    run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh")
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+    assert np.array_equal(load(take.with_name("again.bvh")).translation, load(take).translation)
+    run("recover", "take.bvh", *every[2:])
+    assert run("fill", "take.bvh", "--gaps", "take.recovered.json", "-o", "third.bvh").code == 0
+    third = load(take.with_name("third.bvh"))
+    assert np.array_equal(third.rotation, load(take.with_name("take.recovered.bvh")).rotation)
+
+
+def test_a_replay_says_once_more_what_stood_in_for_a_method(run, take):
+    for method in ("stmi-gan", "cmib"):
+        options = ("--gap", "30:70", "--joints", "LeftArm") if method == "cmib" else ("--gap", "30:70")
+        run("fill", "take.bvh", *options, "--method", method, "-o", "one.bvh", "--force")
+        run("fill", "take.bvh", "--gaps", "one.json", "-o", "two.bvh", "--force")
+        one, two = (json.loads(take.with_name(f"{name}.json").read_text()) for name in ("one", "two"))
+        assert any(" instead" in note for note in one["gaps"][0]["notes"])
+        assert one | {"output": ""} == two | {"output": ""}
+        assert take.with_name("one.bvh").read_bytes() == take.with_name("two.bvh").read_bytes()
+
+
 def test_a_replay_uses_the_method_and_the_unit_of_the_report(run, take):
     run("fill", "take.bvh", "--gap", "60:80", "--method", "linear", "--unit", "inch")
     done = run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh", "--json").json
@@ -218,6 +244,19 @@ def test_a_dry_run_ends_as_the_run_would_and_tells_what_is_left_to_others(run, t
     assert planned.code == done.code == 4
     assert planned.json["left"] == done.json["left"]
     assert "recover" in planned.json["left"]
+
+
+def test_joints_that_drop_out_for_moments_are_left_and_said_to_be(run, take):
+    clip = load(take)
+    rotation = clip.rotation.copy()
+    elbow = clip.skeleton.index("LeftForeArm")
+    rotation[100:103, elbow] = clip.skeleton.rest_rotation[elbow]
+    rotation[20:40], translation = rotation[19], clip.translation.copy()
+    translation[20:40] = translation[19]
+    save(clip.with_motion(rotation, translation), take, force=True)
+    done = run("fill", "take.bvh", "--method", "spline", "--json")
+    assert done.code == 4
+    assert "joints that drop out for moments" in done.json["left"]
 
 
 def test_joints_in_a_range_and_in_the_whole_clip(run, take):
@@ -326,7 +365,7 @@ def test_without_gaps_a_scan_decides(run, take):
     assert "--gap 120:160" in nothing.err
     freeze(take)
     done = run("fill", "take.bvh", "--method", "spline")
-    assert done.code == 0
+    assert done.code == 4, "the thumb is left to recover"
     assert "what a scan finds is filled" in done.out
     # One of the equal frames may be the good one.
     assert json.loads(take.with_name("take.filled.json").read_text())["gaps"][0]["frames"] in (
@@ -549,6 +588,14 @@ def test_a_dry_run_checks_pins(run, take):
         run("fill", "take.bvh", "--gap", f"4s:{end}", "--dry-run", "--pin", f"LeftHand@5s:{end}:1,2,3").code
         == 0
     )
+
+
+def test_two_points_of_a_path_at_one_frame_are_refused(run, take):
+    points = ("--path", "75:1,2", "--path", f"{75 / load(take).fps}s:3,4")
+    done = run("fill", "take.bvh", "--gap", "60:90", *points, "--dry-run")
+    assert done.code == 2
+    assert "two points at frame 75" in done.err
+    assert run("fill", "take.bvh", "--gap", "60:90", *points[:2], *points[:2], "--dry-run").code == 0
 
 
 @pytest.mark.parametrize("text", ["75", "75:1", "75:1,nan", "75:1,2,3", "a:1,2", "75:1,"])

@@ -121,6 +121,18 @@ def test_no_number(tmp_path, good, value):
     assert value in why
 
 
+def test_what_to_do_with_numbers_that_are_too_many_helps(tmp_path, good):
+    for text, fix in (
+        (good.replace("Frames: 4", "Frames: 3", 1), "Frames: 4"),
+        (f"{good}\n1 2 3\n", "Delete"),
+    ):
+        path = tmp_path / "a.bvh"
+        path.write_text(text)
+        with pytest.raises(FileError) as caught:
+            formats.load(path)
+        assert fix in caught.value.fix
+
+
 def test_wrong_counts_name_the_line(tmp_path, good):
     lines = good.splitlines()
     for change in (lines[-2] + " 1.5", lines[-2].rpartition(" ")[0]):

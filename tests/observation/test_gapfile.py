@@ -41,7 +41,8 @@ def test_the_example_in_the_messages_is_right(read):
 
 def test_a_report_can_be_replayed(read):
     entry = {"start": 5, "stop": 9, "joints": ["LeftArm"], "method": "spline", "seam_after": 0.1, "notes": []}
-    assert read({"version": 1, "gaps": [entry], "file": "take.bvh"}) == [Gap(5, 9, ("LeftArm",))]
+    report = {"method": "auto", "gaps": [entry], "open": [], "file": "take.bvh"}
+    assert read(report) == [Gap(5, 9, ("LeftArm",))]
 
 
 @pytest.mark.parametrize(
@@ -75,6 +76,13 @@ def test_bad_entries_are_named(read, entry, why):
 def test_files_without_gaps_are_refused(read, content):
     with pytest.raises(FileError, match="gaps"):
         read(content)
+
+
+@pytest.mark.parametrize("more", [{"method": "linear"}, {"method": "linear", "joint": ["LeftArm"]}])
+def test_what_a_list_of_gaps_does_not_know_is_refused(read, more):
+    """Also where it is a word of reports: nobody would do as it says."""
+    with pytest.raises(FileError, match="cannot be understood"):
+        read(json.dumps([{"frames": "100:110", **more}]))
 
 
 def test_missing_binary_and_folder(tmp_path, cmu_walk):

@@ -66,8 +66,8 @@ def fill(
       interpose fill take.bvh --layer --from wave.bvh --at 130
         --joints RightArm,RightHand   (that arm over the motion that is there)
 
-    Ends with 0 when all is filled, 4 when a gap stays open, or when hips or limbs are
-    left to `interpose recover`, 2 or 3 when nothing was done.
+    Ends with 0 when all is filled, 4 when a gap stays open, or when something is left
+    to `interpose recover`, 2 or 3 when nothing was done.
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.

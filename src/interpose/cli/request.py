@@ -164,7 +164,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
         seen = [what for kind, what in LEFT.items() if any(one.kind == kind for one in found)]
         but = left or (f"{' and '.join(seen)}: interpose scan {file} says more" if seen else "")
         why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
-        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
+        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if left else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]
     lines += [
         f"  {one.start}:{one.stop} {one.kind} ({names(one.joints)}), {one.note}"
@@ -181,7 +181,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     ]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
-    return Request(gaps, said="\n".join(lines), left=left if stuck or sides else "")
+    return Request(gaps, said="\n".join(lines), left=left)
 
 
 def part_of(
@@ -261,7 +261,7 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
     """Points "FRAME:A,B" of --path, in the file's own unit and floor axes: x and z in metres by frame."""
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
     floor = ["xyz".index(axis) for axis in "xyz" if axis != up[-1]]
-    points = {}
+    points: dict[int, np.ndarray] = {}
     for text in texts:
         match = re.fullmatch(rf"({FRAME}):([^,]+),([^,]+)", text)
         try:
@@ -276,7 +276,13 @@ def path_of(texts: list[str], clip: Clip) -> dict[int, np.ndarray]:
                 f"a point is a frame and two coordinates on the floor, {names}, in the file's own unit",
                 "Write for example --path 130:120.5,-40.",
             )
-        points[frame_of(match[1], clip)] = vectors_inside(where, unit, up)[[0, 2]]
+        frame, point = frame_of(match[1], clip), vectors_inside(where, unit, up)[[0, 2]]
+        if np.any(points.setdefault(frame, point) != point):
+            raise RequestError(
+                f"the path is given two points at frame {frame}",
+                "the hips can be over one of them",
+                "Leave one of the points out.",
+            )
     return points
 
 
@@ -364,8 +370,17 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         Gap.parse(one["frames"], None if one["joints"] is None else tuple(one["joints"])) for one in left
     ]
     methods: dict[int, set[str]] = {}
+    chosen: list[int] = []
     for entry in content["gaps"]:
-        methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
+        # What another method stood in for is decided anew, and the report says so once more.
+        stood_in = any(
+            str(note).startswith("not filled by")
+            or (str(note).startswith("filled by") and " instead" in note)
+            for note in entry.get("notes", [])
+        )
+        chosen.append(entry["number"])
+        if not stood_in:
+            methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
     parts = [
         part
         for one in content.get("parts", [])
@@ -384,7 +399,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         _text(content["method"]),
         # Long recoveries are reported in pieces, and where pieces differ the method asked for decides again.
         {number: used.pop() for number, used in methods.items() if len(used) == 1},
-        sorted(methods) if left else None,
+        sorted({*chosen}) if left else None,
         content["seed"],
         {one["number"]: one["why"] for one in left},
         f"as in {path}",

@@ -169,8 +169,7 @@ def skids(slide: float | None, finished: Clip, known: Observation, gap: Gap, fir
     whole = runs(seen.frames)
     slid = feet.measure_all(part, seen, [(a + 1, b - 1) for a, b in whole if b - a > near // 2])
     most = max((one for one, _ in slid), default=None)
-    least = feet.size(finished.skeleton) * (SLIDES if most is not None else UNSEEN)
-    if slide > max(SKIDS * (most or 0.0), least) and len(gap) >= SLIDING * finished.fps:
+    if skidding(slide, most, finished.skeleton) and len(gap) >= SLIDING * finished.fps:
         around = f", around the gap at {most:.0f} at most" if most is not None else ""
         said.append(f"flagged: feet slide at {slide:.0f} cm/s{around}")
     (way, joint, start, stop), *usual = feet.drifts(part, seen, [(gap.start - lo, gap.stop - lo), *whole])
@@ -178,6 +177,12 @@ def skids(slide: float | None, finished: Clip, known: Observation, gap: Gap, fir
         name, frames = finished.skeleton.names[joint], f"{first + lo + start} to {first + lo + stop - 1}"
         said.append(f"flagged: {name} slides by {100 * way:.0f} cm while it stands, in frames {frames}")
     return said
+
+
+def skidding(slide: float, around: float | None, skeleton: Skeleton) -> bool:
+    """Whether feet slide far more, in centimetres a second, than they do `around`, if that is known."""
+    least = feet.size(skeleton) * (SLIDES if around is not None else UNSEEN)
+    return slide > max(SKIDS * (around or 0.0), least)
 
 
 def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:

@@ -46,7 +46,11 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
     if not isinstance(entries, list):
         why = 'expected a list of gaps, or an object with a list under "gaps"'
         raise FileError(f"there are no gaps in {path}", why, f"Write {EXAMPLE}")
-    return [_gap(entry, clip, f"gap number {number} in {path}") for number, entry in enumerate(entries, 1)]
+    reported = isinstance(content, dict) and {"method", "open"} <= content.keys()
+    return [
+        _gap(entry, clip, f"gap number {number} in {path}", reported)
+        for number, entry in enumerate(entries, 1)
+    ]
 
 
 def read_json(path: Path) -> Any:
@@ -62,8 +66,8 @@ def is_report(content: Any) -> bool:
     return isinstance(content, dict) and {"interpose", "method", "seed", "gaps", "open"} <= content.keys()
 
 
-def _gap(entry: Any, clip: Clip, where: str) -> Gap:
-    """One entry of a clip; `where` names it in errors."""
+def _gap(entry: Any, clip: Clip, where: str, reported: bool) -> Gap:
+    """One entry of a clip, of a report or of a list; `where` names it in errors."""
 
     def bad(why: str) -> FileError:
         shown = json.dumps(entry)
@@ -75,7 +79,7 @@ def _gap(entry: Any, clip: Clip, where: str) -> Gap:
     # A report says more about each gap than there is to read; in a list of gaps it is a slip of the pen, and
     # "joint" for "joints" would wipe the whole pose.
     odd = sorted(entry.keys() - KEYS)
-    if odd and "method" not in entry:
+    if odd and not reported:
         raise bad(f"a gap has no {', '.join(odd)}")
     joints = entry.get("joints")
     if joints is not None:

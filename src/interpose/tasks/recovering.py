@@ -12,6 +12,8 @@ from interpose.errors import RequestError
 from interpose.finish import Completion, Provenance
 from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
+from interpose.geometry import rotations
+from interpose.geometry.time import runs
 from interpose.methods.protocol import Method
 from interpose.observation import Gap, Observation
 from interpose.observation.exchange import Bend, Exchange, Taken, crossovers, exchanges, put_back
@@ -20,6 +22,9 @@ from interpose.observation.scan import intact, strays
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
 
+# The share that is lost, of joints that turn at all, from which on what stands still beside them is lost as
+# well, and radians by which that may turn.
+MOST, STANDS = 0.75, 1e-5
 # Seconds by which somebody may miss the frame at which limbs change sides.
 NEAR = 0.1
 
@@ -131,9 +136,23 @@ def _going(clip: Clip, start: int, stop: int) -> list[int]:
     return [joint for joint in line_of(clip) if ways[clip.translated.index(joint)] > STILL]
 
 
+def _fallen(clip: Clip, seen: Observation) -> Observation:
+    """The same without joints that stand still while MOST are lost: of a pose that falls to rest as a whole,
+    one that was near to that anyway does not snap."""
+    lost = np.logical_not(seen.rotation)
+    turning = rotations.angle(clip.rotation, clip.rotation[:1]).max(axis=0, initial=0.0) > STANDS
+    for start, stop in runs(lost[:, turning].sum(axis=1) > MOST * turning.sum()):
+        part = clip.rotation[start:stop]
+        still = rotations.angle(part, part[:1]).max(axis=0) < STANDS
+        beside = clip.rotation[[max(start - 1, 0), min(stop, len(clip) - 1)]]
+        turns = rotations.angle(beside, part[:1]).max(axis=0) > STANDS
+        lost[start:stop] |= still & turns
+    return replace(seen, rotation=~lost)
+
+
 def _by_itself(clip: Clip, start: int, stop: int) -> Observation:
     """What is left of a clip without what was lost in frames start to stop - 1: what `recover` finds."""
-    seen, odd = intact(clip), strays(clip)
+    seen, odd = _fallen(clip, intact(clip)), strays(clip)
     seen.rotation[odd], seen.translation[odd] = True, True
     for one in stuck(clip):
         turns, places = held_values(clip, one)

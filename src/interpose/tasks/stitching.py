@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, on_rig_of, seams
+from interpose.finish import Completion, feet, on_rig_of, seams
+from interpose.finish.notes import skidding
 from interpose.finish.report import GapReport
 from interpose.geometry.measures import acceleration
 from interpose.methods.protocol import Method
@@ -141,7 +142,14 @@ def cycle(clip: Clip) -> Cycle:
             bridge = min(max(2, round(seconds * clip.fps)), end - begin - 2)
             one = Cycle(begin, end - bridge, bridge, apart)
             (closed,) = stitch([clip.slice(one.start, one.stop)], one.frames, loop=True).report.gaps
-            judged[one] = _judged(closed)
+            flags, slides = _judged(closed)
+            # Feet are not where the last frame has them, so that also the briefest way back may skid.
+            kept = clip.slice(one.start, one.stop)
+            own = feet.measure(kept, Observation.full(kept), 1, len(kept) - 1)
+            skids = closed.foot_slide is not None and skidding(
+                closed.foot_slide, own and own[0], clip.skeleton
+            )
+            judged[one] = flags + skids, slides
             if not judged[one][0]:
                 return one
     return min(judged, key=lambda one: judged[one])

@@ -183,8 +183,12 @@ def _bad_line(text: np.ndarray, header: Header, what: str, seen: int = -1) -> Fi
         )
     if short:
         return _truncated(what, header, seen)
+    frames, more = divmod(seen, header.channels)
+    fix = f'Write "Frames: {frames}" if they belong to the clip, or export it again.'
+    if more:
+        fix = f"Delete what is too much (frames have {header.channels} numbers each), or export it again."
     return FileError(
         what,
         f"it says {header.frames} frames of {header.channels} numbers, but {seen} numbers follow",
-        f'Write "Frames: {seen // header.channels}" if they belong to the clip, or export it again.',
+        fix,
     )
