@@ -66,8 +66,8 @@ def fill(
       interpose fill take.bvh --layer --from wave.bvh --at 130
         --joints RightArm,RightHand   (that arm over the motion that is there)
 
-    Ends with 0 when all is filled, 4 when a gap stays open, or when something is left
-    to `interpose recover`, 2 or 3 when nothing was done.
+    Ends with 0 when all is filled, 4 when a gap stays open, or when hips or limbs are
+    left to `interpose recover`, 2 or 3 when nothing was done.
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
@@ -173,6 +173,7 @@ def fill(
     more |= {"path": request.path} if request.path else {}
     more |= {"pinned": request.pins} if request.pins else {}
     more |= {"left": request.left} if request.left else {}
+    more |= {"dropped": request.dropped} if request.dropped else {}
     said = "\n".join(lines)
     code = finish(
         "fill", file, outputs, clip, done, request.seed, why, said, json=json, force=force, more=more
@@ -227,7 +228,8 @@ def _dry_run(
             for job in jobs
         ]
         files = [str(path) for path in outputs.all]
-        more = {"path": request.path, "pinned": request.pins, "left": request.left, "would_end_with": ends}
+        more = {"path": request.path, "pinned": request.pins, "left": request.left}
+        more |= {"dropped": request.dropped, "would_end_with": ends}
         more = {name: value for name, value in more.items() if value}
         say_json({"input": str(file), **details(clip), "would_fill": planned, "would_write": files, **more})
         return code

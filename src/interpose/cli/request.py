@@ -65,6 +65,7 @@ class Request:
         path: points of the floor, as they were written.
         pins: places of joints, as they were written.
         left: what is missing, too, and is another verb's.
+        dropped: the same of joints that drop out for moments, which most takes have: no reason to look again.
         layer: whether the parts are laid over motion that stays.
     """
 
@@ -80,6 +81,7 @@ class Request:
     path: list[str] = field(default_factory=list)
     pins: list[str] = field(default_factory=list)
     left: str = ""
+    dropped: str = ""
     layer: bool = False
 
 
@@ -164,7 +166,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
         seen = [what for kind, what in LEFT.items() if any(one.kind == kind for one in found)]
         but = left or (f"{' and '.join(seen)}: interpose scan {file} says more" if seen else "")
         why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
-        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if left else 0)
+        raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]
     lines += [
         f"  {one.start}:{one.stop} {one.kind} ({names(one.joints)}), {one.note}"
@@ -181,7 +183,13 @@ def _scanned(file: Path, clip: Clip) -> Request:
     ]
     if dropped:
         lines.append(f"  joints that drop out for moments are not ({len(dropped)}): see interpose recover")
-    return Request(gaps, said="\n".join(lines), left=left)
+    said, first = "\n".join(lines), next(iter(others))
+    return Request(
+        gaps,
+        said=said,
+        left=left if stuck or sides else "",
+        dropped=f"{first}, which `interpose recover` restores" if dropped else "",
+    )
 
 
 def part_of(
