@@ -589,6 +589,16 @@ def test_of_a_pose_that_falls_to_rest_every_joint_is_recovered(cmu_walk):
     assert off.max() < 0.1
 
 
+def test_a_frame_in_which_most_joints_are_lost_keeps_the_others(cmu_walk):
+    skeleton, rotation = cmu_walk.skeleton, cmu_walk.rotation.copy()
+    sound = [skeleton.index(name) for name in ("Hips", "RightArm", "RightForeArm", "RightHand")]
+    for joint in {*range(len(skeleton))} - {*sound}:
+        rotation[100, joint] = skeleton.rest_rotation[joint]
+    done = tasks.recover(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert done.provenance[100].any()
+    assert np.array_equal(done.clip.rotation[100, sound], cmu_walk.rotation[100, sound])
+
+
 def test_only_frames_asked_for_are_recovered(cmu_walk):
     noisy, _ = dropped(cmu_walk, 0.1)
     done = tasks.recover(noisy, frames=(40, 60))

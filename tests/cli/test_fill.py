@@ -152,6 +152,7 @@ def test_all_turns_lost_are_not_the_whole_pose_in_a_report_and_its_replay(run, t
     every = ("--gap", "60:100", "--joints", ",".join(names), "--method", "spline")
     done = run("fill", "take.bvh", *every, "--json").json
     assert done["gaps"][0]["joints"] == list(names)
+    assert "splined" not in run("scan", "take.filled.bvh").out
     run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh")
     assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
     assert np.array_equal(load(take.with_name("again.bvh")).translation, load(take).translation)
@@ -168,6 +169,7 @@ def test_a_replay_says_once_more_what_stood_in_for_a_method(run, take):
         run("fill", "take.bvh", "--gaps", "one.json", "-o", "two.bvh", "--force")
         one, two = (json.loads(take.with_name(f"{name}.json").read_text()) for name in ("one", "two"))
         assert any(" instead" in note for note in one["gaps"][0]["notes"])
+        assert bool(one["weights"]) is (one["gaps"][0]["method"] == "base")
         assert one | {"output": ""} == two | {"output": ""}
         assert take.with_name("one.bvh").read_bytes() == take.with_name("two.bvh").read_bytes()
 

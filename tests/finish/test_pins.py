@@ -42,6 +42,29 @@ def test_pins_are_met_by_joints_of_few_axes(data, tmp_path, joint):
     assert not [note for note in done.report.gaps[0].notes if "misses" in note]
 
 
+def test_turns_that_joints_of_few_axes_cannot_make_are_flagged(data, cmu_walk):
+    """A hand that is held as it was comes to its place, and cannot be turned as it was."""
+    for clip, joint, far in ((load(data / "cmu_02_03.amc"), "rhand", True), (cmu_walk, "RightHand", False)):
+        turned, placed = (some[9, clip.skeleton.index(joint)] for some in clip.kinematics())
+        frames = np.arange(15, 25)
+        held = Pin(
+            joint, frames, np.tile(placed + np.array([0.0, 0.1, 0.0]), (10, 1)), np.tile(turned, (10, 1))
+        )
+        notes = tasks.fill(clip, [Gap(10, 30)], "spline", pins=[held]).report.gaps[0].notes
+        assert any("otherwise than its pin says" in note for note in notes) is far
+
+
+def test_of_pins_out_of_reach_the_nearest_round_counts(data):
+    clip = load(data / "cmu_02_03.amc")
+    pin = lifted(clip, 20, (0.0, 2.0, 0.0), "rhand")
+    done = tasks.fill(clip, [Gap(10, 30)], "spline", pins=[pin])
+    hand = clip.skeleton.index("rhand")
+    free = replace(clip, source=None)
+    other = tasks.fill(free, [Gap(10, 30)], "spline", pins=[pin])
+    off = [np.linalg.norm(one.clip.positions()[20, hand] - pin.position[0]) for one in (done, other)]
+    assert off[0] < off[1] + 0.05
+
+
 @pytest.mark.parametrize("method", ["spline", "small", "cae"])
 def test_a_hand_is_where_it_is_pinned_and_all_observed_values_are_the_same(cmu_walk, method):
     pin = lifted(cmu_walk)

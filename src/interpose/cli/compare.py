@@ -132,20 +132,11 @@ def compare(
 
 def _usual(license: str) -> list[str]:
     """What is compared where nothing is named: what may be used of what is usual."""
-    from interpose.cli.request import check_method
-    from interpose.methods import weights
+    from interpose.methods import registry, weights
 
     weights.allow(license)
-
-    def usable(name: str) -> bool:
-        try:
-            check_method(name, license)
-        except RequestError:
-            return False
-        return True
-
-    found = [name for name in USUAL if usable(name)]
-    return found if len(found) > 1 else [*found, *filter(usable, ["small-open"])]
+    spline, *networks = USUAL
+    return [spline, *(registry.usable(tuple(networks)) or registry.usable(("small-open",)))]
 
 
 def _check(page: Path, force: bool) -> None:

@@ -18,6 +18,7 @@ from interpose.errors import RequestError
 if TYPE_CHECKING:
     from interpose.cli.request import Request
     from interpose.clip import Clip
+    from interpose.finish import Completion, GapReport
     from interpose.observation import Gap, Pin
 
 
@@ -167,6 +168,8 @@ def fill(
             path=points,
             pins=pins,
         )
+    if request.told:
+        done = _retold(done, request.told)
     why = {number: request.why.get(number) or _why(left, most) for number, left in numbered(done)}
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
     more |= {"layer": True} if layer or request.layer else {}
@@ -179,6 +182,16 @@ def fill(
         "fill", file, outputs, clip, done, request.seed, why, said, json=json, force=force, more=more
     )
     return code or (4 if request.left else 0)
+
+
+def _retold(done: Completion, told: dict[str, list[str]]) -> Completion:
+    """A completion whose gaps are told of, by their frames, what is told."""
+
+    def with_told(gap: GapReport) -> GapReport:
+        more = [note for note in told.get(f"{gap.start}:{gap.stop}", ()) if note not in gap.notes]
+        return replace(gap, notes=(*more, *gap.notes))
+
+    return replace(done, report=replace(done.report, gaps=list(map(with_told, done.report.gaps))))
 
 
 def _why(gap: Gap, max_gap: int | None) -> str:

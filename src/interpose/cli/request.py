@@ -30,6 +30,8 @@ LEFT = {
     "splined": "what was splined",
     "still": "what stands still",
 }
+# Notes that tell why another method filled a gap.
+STOOD_IN = re.compile(r"not filled by |filled by .* instead")
 OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
 
 
@@ -67,6 +69,7 @@ class Request:
         left: what is missing, too, and is another verb's.
         dropped: the same of joints that drop out for moments, which most takes have: no reason to look again.
         layer: whether the parts are laid over motion that stays.
+        told: of gaps by their frames why another method filled them than the one that was asked for.
     """
 
     gaps: list[Gap]
@@ -83,6 +86,7 @@ class Request:
     left: str = ""
     dropped: str = ""
     layer: bool = False
+    told: dict[str, list[str]] = field(default_factory=dict)
 
 
 def from_options(
@@ -378,17 +382,12 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         Gap.parse(one["frames"], None if one["joints"] is None else tuple(one["joints"])) for one in left
     ]
     methods: dict[int, set[str]] = {}
-    chosen: list[int] = []
+    told: dict[str, list[str]] = {}
     for entry in content["gaps"]:
-        # What another method stood in for is decided anew, and the report says so once more.
-        stood_in = any(
-            str(note).startswith("not filled by")
-            or (str(note).startswith("filled by") and " instead" in note)
-            for note in entry.get("notes", [])
-        )
-        chosen.append(entry["number"])
-        if not stood_in:
-            methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
+        methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
+        # What filled it is not asked why, so that what another method stood in for is said once more.
+        if stood := [note for note in entry.get("notes", []) if STOOD_IN.match(_text(note))]:
+            told[_text(entry["frames"])] = stood
     parts = [
         part
         for one in content.get("parts", [])
@@ -407,7 +406,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         _text(content["method"]),
         # Long recoveries are reported in pieces, and where pieces differ the method asked for decides again.
         {number: used.pop() for number, used in methods.items() if len(used) == 1},
-        sorted({*chosen}) if left else None,
+        sorted(methods) if left else None,
         content["seed"],
         {one["number"]: one["why"] for one in left},
         f"as in {path}",
@@ -416,6 +415,7 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         [_text(one) for one in content.get("path", [])],
         [_text(one) for one in content.get("pinned", [])],
         layer=bool(content.get("layer")),
+        told=told,
     )
 
 

@@ -44,7 +44,9 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     clip = reading.load(file)
     made = _made(file, clip)
     # What a network says is as smooth as what a program splines: it is not to be filled once more.
-    found = [one for one in scan(clip) if not (one.kind == "splined" and _within(one, made))]
+    found = [
+        one for one in scan(clip) if not (one.kind == "splined" and _within(one, made, clip.skeleton.names))
+    ]
     if json:
         findings = [
             {
@@ -172,12 +174,12 @@ def _frames(made: list[Gap]) -> list[str]:
     return list(dict.fromkeys(f"{gap.start}:{gap.stop}" for gap in made))
 
 
-def _within(one: Finding, made: list[Gap]) -> bool:
+def _within(one: Finding, made: list[Gap], names: tuple[str, ...]) -> bool:
     """Whether what was found lies in what was filled, but for a frame or two beside it."""
     return any(
         gap.start - BESIDE <= one.start
         and one.stop <= gap.stop + BESIDE
-        and (gap.joints is None or (one.joints is not None and {*one.joints} <= {*gap.joints}))
+        and (gap.joints is None or {*(one.joints or names)} <= {*gap.joints})
         for gap in made
     )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 import numpy as np
 
@@ -26,6 +27,8 @@ from interpose.observation import Gap, Observation, Pin
 
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
+# Degrees by which a joint may be turned otherwise than its pin says.
+OTHERWISE = 1.0
 # Metres from which on a foot that hovers, as a hand is pinned, is let down; and centimetres a second by which
 # feet may slide more for it.
 HOVERS, SLIDES = 0.002, 1.0
@@ -208,11 +211,21 @@ def _pinned(
         done = lower if _slides(lower) <= _slides(done) + SLIDES else done
     done = _told_of(body, done)
     off = [(pin, frame, 100 * distance) for pin, frame, distance in pins.missed(done.clip, asked)]
+    turned = [(np.degrees(angle), pin, frame) for pin, frame, angle in pins.misturned(done.clip, asked)]
     away = {(pin.joint, frame): distance for pin, frame, distance in pins.missed(unled.clip, asked)}
     way = over_floor(done.clip)
 
     def judged(gap: GapReport) -> GapReport:
         gap = _on_path(gap, path or {}, way)
+        otherwise, pin, at = max(
+            (one for one in turned if gap.start <= one[2] < gap.stop),
+            default=(0.0, None, 0),
+            key=itemgetter(0),
+        )
+        if pin is not None and otherwise > OTHERWISE:
+            said = f"flagged: {pin.joint} is turned {otherwise:.0f} degrees otherwise than its pin says at "
+            why = f"frame {ask.first + at}: it cannot be turned so there"
+            gap = replace(gap, notes=(*gap.notes, said + why))
         inside = [one for one in off if gap.start <= one[1] < gap.stop]
         if not inside:
             return gap
@@ -245,7 +258,7 @@ def _told_of(body: Completion, done: Completion, but: tuple[str, ...] = ()) -> C
         if (one := before.get(gap.start)) is None:
             return gap
         if one.method != done.report.method == gap.method:
-            gap = replace(gap, method=one.method, model=None)
+            gap = replace(gap, method=one.method, model=one.model, weights=one.weights)
         kept = [note for note in one.notes if not note.startswith("flagged") or LONG in note]
         kept = [note for note in kept if note not in (*but, *gap.notes)]
         return replace(

@@ -22,6 +22,7 @@ def gap_report(
     gap: Gap,
     span: Span,
     raw: Raw,
+    instead: Raw | None,
     error: np.ndarray | None,
     before: tuple[float, float | None] | None,
     bounds: jumps.Bounds | None,
@@ -33,25 +34,26 @@ def gap_report(
     part = finished.slice(gap.start, gap.stop)
     own = span.method == method
     skeleton = finished.skeleton
+    spoke = raw if own else instead
     lengths = np.linalg.norm(skeleton.rest_translation, axis=1) * skeleton.scale_above
     lengths[list(finished.translated)] = np.nan
     after, within = (of(finished, known, gap, bounds) for of in (jumps.beside, jumps.inside))
     alive = None if gap.joints is not None else notes.liveliness(finished, gap)
     glide, ahead = notes.gliding(finished, known, gap), gap.stop == len(finished)
     networks = gap.joints is None and "model" in raw.notes
-    never = [] if own and "model" in raw.notes else notes.never(known, gap, skeleton.names)
+    never = [] if spoke and "model" in spoke.notes else notes.never(known, gap, skeleton.names)
     # A method that says something else of them than how they rest has something to say.
     never = [name for name in never if _rests(part, skeleton.index(name))]
     inside = penetration.deepest(finished, gap.start, gap.stop, first)
-    risk = _risk(raw, finished, known, gap) if own else None
+    risk = _risk(spoke, finished, known, gap) if spoke else None
     solved = None if error is None or not own else float(np.nanmean(error[gap.start : gap.stop]))
     return GapReport(
         gap.start,
         gap.stop,
         gap.joints,
         span.method,
-        model=raw.notes.get("model") if own else None,
-        weights=raw.notes.get("weights", ()) if own else (),
+        model=spoke.notes.get("model") if spoke else None,
+        weights=spoke.notes.get("weights", ()) if spoke else (),
         solve_error=_centi(solved),
         seam_before=_centi(before[0] if before else None),
         seam_after=_centi(after[0] if after else None),
@@ -82,7 +84,7 @@ def gap_report(
             *notes.doubtful(risk, finished, gap, first),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
             *notes.rests(never, span.method, skeleton),
-            *(raw.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if own else ()),
+            *(spoke.notes.get("remarks", {}).get(f"{gap.start}:{gap.stop}", ()) if spoke else ()),
         ),
     )
 

@@ -48,7 +48,7 @@ ROUNDS = 24
 STALLED, NEARER = 3, 0.998
 # What a round leaves at most of how far pins are missed once they are written, or it is the last: a third is
 # usual where they are within reach.
-LEFT = 0.8
+LEFT = 0.5
 # Metres a second squared by which joints of legs may jump for their feet to stand, where they do less nearby.
 # Of 300 fills of validation performers three had one that did twice as far as anywhere in the truth; so one
 # has (`bench artefacts --most 25`).
@@ -244,6 +244,7 @@ class _Work:
             return
         gaps = [gap for gap in self.gaps if self._of(gap) in failed]
         raw = self.simpler or second(ask.fallback, self.hidden, self.observation, gaps, ask.seed)
+        self.simpler = raw  # whose weights they are is said
         other, _ = self._hear(raw)
         start, own = merge(other, self.hidden, known), merge(self.current, self.hidden, known)
         for span in failed:
@@ -305,6 +306,7 @@ class _Work:
                 gap,
                 self._of(gap),
                 raw,
+                instead=self.simpler,
                 error=self.error,
                 before=self.before[gap],
                 bounds=self.bounds,
@@ -321,17 +323,19 @@ class _Work:
     def _met(self, current: Clip, pinned: tuple[Pin, ...]) -> Clip:
         """The clip with its pins met, by what its file holds of it: joints of AMC turn about fewer axes than
         three, and what these leave over others make up for, round by round."""
-        before = np.inf
+        best, least = current, np.inf
         for _ in range(ROUNDS):
             met = pins.meet(current, self.known, pinned, axes=self._axes)
             current = self._held(met, self.known)
             if current is met:
-                break
+                return met
             off = max((far / pin.tolerance for pin, _, far in pins.missed(current, pinned)), default=0.0)
-            if off <= 1.0 or off > LEFT * before:
+            nearer = off <= LEFT * least
+            if off < least:
+                best, least = current, off
+            if off <= 1.0 or not nearer:
                 break
-            before = off
-        return current
+        return best
 
     def _of(self, gap: Gap) -> Span:
         return next(span for span in self.spans if span.start <= gap.start and gap.stop <= span.stop)

@@ -206,6 +206,17 @@ def missed(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]
                 yield pin, int(frame), float(distance)
 
 
+def misturned(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]]:
+    """Each pin with an orientation at each of its frames, and by how many radians the joint is turned
+    otherwise there."""
+    turned = clip.kinematics()[0]
+    for pin in pins:
+        if pin.orientation is not None:
+            off = rotations.angle(turned[pin.frames, clip.skeleton.index(pin.joint)], pin.orientation)
+            for frame, angle in zip(pin.frames, off):
+                yield pin, int(frame), float(angle)
+
+
 def _gaps(known: Observation) -> Iterator[tuple[tuple[int, int], tuple[int, int], list[int]]]:
     """Of each gap the frames from start to before stop, those with the ones beside it, and which of these are
     its edges, of which nothing can change."""

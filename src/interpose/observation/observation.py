@@ -308,11 +308,7 @@ class Observation:
         return known
 
     def gaps(self, skeleton: Skeleton) -> list[Gap]:
-        """Runs of frames in which the same values are missing, in order of time.
-
-        Of the whole pose where no rotation is known, nor where it is: a clip of which all turns are lost, and
-        the way is not, lacks all its joints.
-        """
+        """Runs of frames in which the same values are missing, in order of time."""
         found: list[Gap] = []
         missing = ~(self.rotation & self.translation)
         if not missing.any():
@@ -323,7 +319,7 @@ class Observation:
             gone = missing[start]
             if not gone.any():
                 continue
-            everything = not (self.rotation[start].any() or self.translation[start].all())
+            everything = (~self.rotation[start]).all()
             names = None if everything else tuple(skeleton.names[j] for j in np.flatnonzero(gone))
             found.append(Gap(start, stop, names))
         return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -114,7 +114,8 @@ def fill(
         if progress:
             progress((done + 1) / len(work))
     left = [job.gap for job in jobs if job.method is None]
-    filled = whole.completion(Report(registry.name_of(method), whole.told(), left, action))
+    listed = (_turns(whole.told(), observation, clip), _turns(left, observation, clip))
+    filled = whole.completion(Report(registry.name_of(method), *listed, action))
     if going is not None and going.any():
         for gap in left:
             going[gap.start : gap.stop] = False
@@ -187,6 +188,19 @@ def _check_open(jobs: Iterable[Job], path: Iterable[int]) -> None:
                 "the gap is longer than allowed, or not among the gaps chosen",
                 "Leave the point out, or let the gap be filled.",
             )
+
+
+Named = TypeVar("Named", Gap, GapReport)
+
+
+def _turns(gaps: Iterable[Named], observation: Observation, clip: Clip) -> list[Named]:
+    """Gaps in which all turns are lost, and where the body is, is not, as gaps of all joints: told as of the
+    whole pose a report of them would be repeated without its place."""
+
+    def placed(gap: Named) -> bool:
+        return gap.joints is None and bool(observation.translation[gap.start : gap.stop].all())
+
+    return [replace(gap, joints=clip.skeleton.names) if placed(gap) else gap for gap in gaps]
 
 
 def _points(path: Mapping[int, Any]) -> dict[int, np.ndarray]:

@@ -100,10 +100,9 @@ def _suited(clip: Clip, observation: Observation, gap: Gap, lead: Gap) -> tuple[
 def _span(observation: Observation, clip: Clip, start: int, stop: int) -> Gap:
     """A run of incomplete frames as one gap: of the whole pose, if that is missing anywhere in it."""
     part = observation.rotation[start:stop]
-    placed = observation.translation[start:stop]
-    if (~part.any(axis=1) & ~placed.all(axis=1)).any():
+    if (~part).all(axis=1).any():
         return Gap(start, stop)
-    lost = ~(part & placed)
+    lost = ~(part & observation.translation[start:stop])
     return Gap(start, stop, tuple(clip.skeleton.names[j] for j in np.flatnonzero(lost.any(axis=0))))
 
 

@@ -22,8 +22,8 @@ from interpose.observation.scan import intact, strays
 from interpose.skeletons.carrier import STILL, line_of, place_of
 from interpose.tasks.filling import fill
 
-# The share that is lost, of joints that turn at all, from which on what stands still beside them is lost as
-# well, and radians by which that may turn.
+# The share that is lost, of joints that turn at all, from which on what is at rest beside them is lost as
+# well, and radians by which it may be off.
 MOST, STANDS = 0.75, 1e-5
 # Seconds by which somebody may miss the frame at which limbs change sides.
 NEAR = 0.1
@@ -137,13 +137,13 @@ def _going(clip: Clip, start: int, stop: int) -> list[int]:
 
 
 def _fallen(clip: Clip, seen: Observation) -> Observation:
-    """The same without joints that stand still while MOST are lost: of a pose that falls to rest as a whole,
+    """The same without joints that are at rest while MOST are lost: of a pose that falls to rest as a whole,
     one that was near to that anyway does not snap."""
     lost = np.logical_not(seen.rotation)
     turning = rotations.angle(clip.rotation, clip.rotation[:1]).max(axis=0, initial=0.0) > STANDS
     for start, stop in runs(lost[:, turning].sum(axis=1) > MOST * turning.sum()):
         part = clip.rotation[start:stop]
-        still = rotations.angle(part, part[:1]).max(axis=0) < STANDS
+        still = rotations.angle(part, clip.skeleton.rest_rotation).max(axis=0) < STANDS
         beside = clip.rotation[[max(start - 1, 0), min(stop, len(clip) - 1)]]
         turns = rotations.angle(beside, part[:1]).max(axis=0) > STANDS
         lost[start:stop] |= still & turns
