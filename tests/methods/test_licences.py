@@ -126,7 +126,7 @@ def test_what_is_not_installed_is_said_of_models(capsys, wheel_alone):
     assert "pip install ./weights" in capsys.readouterr().out
     assert main(["models", "spline"]) == 0
     assert "no trained weights" in capsys.readouterr().out
-    main(["models"])
+    main(["models", "auto"])
     assert "what measured best: small-open, and for gaps of less than 2" in capsys.readouterr().out
 
 
