@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import TARGET, under_root
 
 import interpose
 from interpose.formats import load, save
@@ -34,6 +35,16 @@ def test_stitch_takes_what_is_of_another_rig(run, rigs):
     first, second = json.loads((rigs / "hands.stitched.json").read_text())["clips"]
     assert second["retargeted"]
     assert "retargeted" not in first
+
+
+def test_what_goes_along_with_a_body_is_not_said_to_stay(run, rigs):
+    save(under_root(load(rigs / "walk.bvh"), True), rigs / "engine.bvh")
+    done = run("convert", "hands.bvh", "mine.bvh", "--onto", "engine.bvh")
+    assert done.code == 0
+    made = load(rigs / "mine.bvh")
+    assert np.ptp(made.translation[:, TARGET], axis=0).max() > 0.1
+    notes = [line for line in done.out.splitlines() if "mean pose" in line]
+    assert not any("ik_foot_l" in line or "root" in line for line in notes)
 
 
 def test_convert_puts_a_motion_onto_a_rig(run, rigs):

@@ -52,6 +52,7 @@ def test_the_report_says_where_a_clip_lies(run, takes):
     assert "step" in placed["gap_before"] or "at" in placed["gap_before"]
     start, stop = map(int, placed["frames"].split(":"))
     turn = np.radians(placed["yaw"])
+    assert placed["yaw"] != round(placed["yaw"], 3), "about the origin, from which a clip may lie far away"
     walk = load(takes / "walk.bvh")
     root, shift = walk.root[100:200], np.array(placed["shift"]) * walk.source.unit
     x = np.cos(turn) * root[:, 0] + np.sin(turn) * root[:, 2] + shift[0]

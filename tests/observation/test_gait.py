@@ -81,6 +81,15 @@ def test_who_stands_is_no_cycle_of_a_walk(walk):
     assert found.stop + found.frames - found.start == pytest.approx(41, abs=4)
 
 
+def test_who_does_nothing_but_stand_goes_round(walk):
+    """Any pose is like any other, and half of how far they are from their mean is nothing."""
+    time = np.arange(120)[:, None] / 30
+    sway = 0.02 * np.sin(2.1 * time + np.arange(len(walk.skeleton))) + 0.004 * time
+    rotation = rotations.multiply(walk.rotation[[90] * 120], rotations.exp(sway[..., None] * [1.0, 0.0, 0.0]))
+    found = tasks.cycle(walk.with_motion(rotation, walk.translation[[90] * 120]))
+    assert found.stop + found.frames - found.start > 60
+
+
 def test_of_ways_to_go_round_the_first_one_counts_that_closes_well(walk, monkeypatch):
     """Where all are flagged, the one in which feet slide least."""
     found = cycles(find_humanoid(walk), walk)

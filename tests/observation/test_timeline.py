@@ -13,6 +13,7 @@ from interpose.errors import RequestError
 from interpose.formats import load
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
+from interpose.observation import timeline
 from interpose.observation.timeline import Placement, lay
 from interpose.skeletons.fitting import fit
 from interpose.skeletons.humanoid import reflect
@@ -145,6 +146,13 @@ def test_lengths_are_chosen_with_a_reason(cmu_walk, run):
     assert "in step" in walk_on.laid[1].why
     assert len(speed_up.gaps[0]) > 25
     assert "pace" in speed_up.laid[1].why
+
+
+def test_who_stands_is_given_a_moment_to_another_pose(cmu_walk):
+    """Not a single frame, in which velocities would jump; a walk that was cut is: it goes on as it did."""
+    still = cmu_walk.take([60] * 40)
+    assert timeline.plausible_length(still, 39, still, 0)[0] == round(timeline.LEAST * 30) - 1
+    assert timeline.plausible_length(cmu_walk, 60, cmu_walk, 62)[0] <= 3
 
 
 def test_backing_away_is_no_reason_to_turn_round(cmu_walk):

@@ -130,6 +130,20 @@ def test_a_target_below_another_one_stays_on_its_own_joint(rigged):
     done = interpose.fill(both, (60, 110), method="small").clip
     assert off(done).max() < 1e-6
     assert np.abs(done.positions()[:, -1] - done.positions()[:, hand]).max() < 1e-6
+    # Where the foot's goes along with a leg that is lost, what hangs from it stays on its hand.
+    leg = ("LeftUpLeg", "LeftLeg", "LeftFoot")
+    done = interpose.recover(both, leg, frames=(60, 110), method="small").clip
+    assert np.abs(done.positions()[60:110, TARGET] - both.positions()[60:110, TARGET]).max() > 0.02
+    assert np.abs(done.positions()[:, -1] - both.positions()[:, hand]).max() < 1e-6
+
+
+def test_targets_come_onto_a_body_of_another_size(rigged):
+    old = rigged.skeleton
+    skeleton = replace(old, rest_translation=0.6 * old.rest_translation)
+    child = replace(rigged, skeleton=skeleton, translation=0.6 * rigged.translation)
+    made = interpose.retarget(rigged, child)
+    assert off(made).max() < 1e-6
+    assert np.abs(made.positions()[0] - child.positions()[0])[:, 1].max() < 1e-6
 
 
 def test_what_does_not_sit_on_a_joint_stays_as_it_is(rigged, cmu_walk):

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from interpose.clip import Clip
 
 FASTEST = 1000.0  # frames a second
+STIRS = 1e-4  # radians, or metres, from which on a joint moves
 
 
 def convert(
@@ -143,7 +144,7 @@ def _convert(
     kept = []
     if onto is not None:
         made = retarget(made, rig)
-        kept = _kept(clip, rig) if other_rig(clip, rig) else []
+        kept = _kept(clip, rig, made) if other_rig(clip, rig) else []
     made = resample(made, fps, smooth=True) if fps is not None else made
     notes = [*kept, *save(replace(made, name=output.stem), output, force=force)]
     if json:
@@ -157,11 +158,18 @@ def _convert(
     say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps{said}")
 
 
-def _kept(clip: Clip, rig: Clip) -> list[str]:
-    """What the motion of another rig tells nothing of."""
+def _kept(clip: Clip, rig: Clip, made: Clip) -> list[str]:
+    """What the motion of another rig tells nothing of, and what goes along with nothing in what was made."""
+    import numpy as np
+
     from interpose.finish.retargeting import common
+    from interpose.geometry import rotations
 
     told = common(clip, rig)
-    others = [name for name in rig.skeleton.names if name not in told]
+    goes = np.zeros(len(made.skeleton), bool)
+    if len(made):
+        goes = rotations.angle(made.rotation, made.rotation[:1]).max(axis=0) > STIRS
+        goes[list(made.translated)] |= np.ptp(made.translation, axis=0).max(axis=-1) > STIRS
+    others = [name for name, goes in zip(rig.skeleton.names, goes) if name not in told and not goes]
     what = f"{len(others)} joint{'s keep their' if len(others) > 1 else ' keeps its'} mean pose in {rig.name}"
     return [f"{what}: {names(others)}"] if others else []

@@ -244,7 +244,8 @@ def _placed(placement: Placement, clip: Clip) -> dict[str, Any]:
     """A placement as numbers of the file that a clip is written to: what --path and --pin speak in, too."""
     unit, up = getattr(clip.source, "unit", 1.0), getattr(clip.source, "up", "y")
     shift = [round(float(value), 4) for value in vectors_in_file(np.array(placement.shift), unit, up)]
-    return {"yaw": round(float(np.degrees(placement.yaw)), 2), "shift": shift}
+    # About the origin, from which a clip may lie far away.
+    return {"yaw": round(float(np.degrees(placement.yaw)), 7), "shift": shift}
 
 
 def _more(pieces: list[Piece], done: Stitched) -> dict[str, Any]:

@@ -24,6 +24,8 @@ ALIKE = 0.5
 # Seconds that a motion which goes round takes at most; and the share of what its poses are from their mean
 # within which it comes back.
 ROUND, CLOSES = 8.0, 0.5
+# Metres within which who hardly moves comes back, of whom any pose is like any other: the longer the better.
+NEARLY = 0.01
 MOST = 5  # ways to go round that are told
 LIVELY = 0.7  # of the pace of a whole clip: what moves less than that stands in it
 TURNED = 0.05  # metres that joints may be apart instead of the body going round by a radian
@@ -119,7 +121,7 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
 
     Those that are most alike first, from SHORTEST to ROUND seconds apart, of those between which it moves as
     the whole of it does: who stands is most alike; a few at most, each half of SHORTEST apart from others.
-    None where nothing comes back.
+    Of who does nothing but stand the longest first. None where nothing comes back.
     """
     least, most = max(1, round(SHORTEST * clip.fps)), min(round(ROUND * clip.fps), len(clip) - 1)
     if least > most:
@@ -134,16 +136,18 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
     gone = np.cumsum(np.linalg.norm(paces, axis=2).mean(axis=1))
     # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
     usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
+    idles = CLOSES * usual < NEARLY
+    within = NEARLY if idles else CLOSES * usual
     found = []
     for lag in range(least, most + 1):
         apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
         apart[gone[lag:] - gone[:-lag] < LIVELY * lag * gone[-1] / len(clip)] = np.inf
         apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
         beside = np.pad(apart, 1, constant_values=np.inf)
-        at = np.flatnonzero((apart < beside[:-2]) & (apart <= beside[2:]) & (apart <= CLOSES * usual))
+        at = np.flatnonzero((apart < beside[:-2]) & (apart <= beside[2:]) & (apart <= within))
         found += [(float(apart[i]), int(i), int(i) + lag) for i in at[np.argsort(apart[at])[:MOST]]]
     chosen: list[tuple[int, int, float]] = []
-    for apart_by, start, stop in sorted(found):
+    for apart_by, start, stop in sorted(found, key=lambda one: (one[1] - one[2], one) if idles else one):
         if len(chosen) == MOST:
             break
         if all(abs(start - a) + abs(stop - b) >= least for a, b, _ in chosen):

@@ -35,6 +35,8 @@ PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
 # What is unhurried: turns of a joint (degrees a second), getting up or down (metres a second), and changes of
 # pace (metres a second, a second). A step takes STEP seconds, and a transition that is shorter slides.
 TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
+# Seconds that who stands takes to another pose, however near that is: in a frame velocities would jump.
+LEAST = 0.3
 
 
 @dataclass(frozen=True)
@@ -327,7 +329,7 @@ def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[
 
     As long as what takes longest: the way of the hips at the pace of the two clips (of the second beside the
     pose; people who stand set off at PACE), the hips up or down (RISE), the joint that has furthest to turn
-    (at TURN).
+    (at TURN); of who stands LEAST at least.
     """
     fps = start.fps
     places, paces = [], []
@@ -342,6 +344,7 @@ def plausible_length(start: Clip, last: int, target: Clip, first: int) -> tuple[
     rise = abs(float(places[1][1] - places[0][1]))
     name, turn = _furthest(start.slice(last, last + 1), target.slice(first, first + 1))
     needed, why = max(
+        (LEAST * (max(paces) <= STANDS), f"who stands takes {LEAST:.1f} s at least"),
         (way / pace, f"{way:.2f} m at {pace:.1f} m/s"),
         (rise / RISE, f"the hips go {rise:.2f} m up or down at {RISE:.1f} m/s"),
         (turn / TURN, f"{name} turns by {turn:.0f} degrees at {TURN:.0f} a second"),

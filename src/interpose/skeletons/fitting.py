@@ -47,7 +47,7 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
             long = float(np.linalg.norm(rest[joint]))
             ratio = float(np.linalg.norm(bone)) / long if long > STILL else 1.0
             translation[:, column] = bone + ratio * (translation[:, column] - rest[joint])
-    scale = 1.0
+    scale, beside = 1.0, list[int]()
     placed = [joint for joint in like.translated if order[joint] in clip.translated]
     inner = [joint for joint in range(len(mine)) if joint not in placed or kept[joint]]
     if not np.allclose(rest[inner], mine.rest_translation[inner], atol=STILL):
@@ -60,23 +60,32 @@ def fit(clip: Clip, like: Clip) -> tuple[Clip, float]:
                 column = like.translated.index(joint)
                 pivot = translation[:1, column] * [1.0, 0.0, 1.0] * (mine.parents[joint] < 0)
                 translation[:, column] = pivot + scale * (translation[:, column] - pivot)
+            # Targets of feet and hands lie beside the body, as far as it is large.
+            line = mine.below[:, hips] | mine.below[hips] | kept
+            beside = [joint for joint in placed if not line[joint] and mine.parents[joint] >= 0]
+            for joint in beside:
+                translation[:, like.translated.index(joint)] *= scale
     fitted = replace(
         like, rotation=clip.rotation[:, order], translation=translation, name=clip.name, source=clip.source
     )
-    return (fitted if scale == 1 else _from(clip, fitted)), scale
+    return (fitted if scale == 1 else _from(clip, fitted, beside)), scale
 
 
-def _from(clip: Clip, fitted: Clip) -> Clip:
-    """`fitted` with hips that begin over the same floor point as in the clip, below a root that stays."""
+def _from(clip: Clip, fitted: Clip, beside: list[int]) -> Clip:
+    """`fitted` with hips, and what lies `beside` them, that begin over the same floor point as in the clip,
+    below a root that stays."""
     top = carriers(fitted)[0]
     above = fitted.skeleton.parents[top]
     if above < 0 or not len(clip):
         return fitted
     begins, now = (some.slice(0, 1).positions()[0, hips_of(some.skeleton)] for some in (clip, fitted))
-    back = rotations.conjugate(fitted.kinematics()[0][:, above])
-    shift = rotations.rotate(back, (begins - now) * [1.0, 0.0, 1.0])
+    skeleton, turned = fitted.skeleton, fitted.kinematics()[0]
     translation = fitted.translation.copy()
-    translation[:, fitted.translated.index(top)] += shift / fitted.skeleton.scale_above[top]
+    for joint in (top, *beside):
+        if not {*beside} & {*skeleton.ancestors(joint)} and top not in skeleton.ancestors(joint):
+            back = rotations.conjugate(turned[:, skeleton.parents[joint]])
+            shift = rotations.rotate(back, (begins - now) * [1.0, 0.0, 1.0])
+            translation[:, fitted.translated.index(joint)] += shift / skeleton.scale_above[joint]
     return fitted.with_motion(fitted.rotation, translation)
 
 

@@ -26,7 +26,10 @@ def following(clip: Clip, known: np.ndarray, turns: np.ndarray) -> np.ndarray:
     turned, placed = clip.kinematics()
     for joint in _beside(clip, whole):
         if seats := _seats(turned, placed, joint, whole, clip.skeleton):
-            found[:, joint] = whole[:, joint] & ~_both(joint, seats[0][0], whole, clip.skeleton)
+            # So does what hangs from one that goes along, though what it sits on stays.
+            above = found[:, [*clip.skeleton.ancestors(joint)]].any(axis=1)
+            lost = ~_both(joint, seats[0][0], whole, clip.skeleton)
+            found[:, joint] = whole[:, joint] & (lost | above)
     return found
 
 
