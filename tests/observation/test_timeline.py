@@ -155,6 +155,21 @@ def test_who_stands_is_given_a_moment_to_another_pose(cmu_walk):
     assert timeline.plausible_length(cmu_walk, 60, cmu_walk, 62)[0] <= 3
 
 
+def test_who_stands_goes_round_on_the_spot(cmu_walk):
+    """The sway of hips was carried on as travel, and planted feet were elsewhere in each round."""
+    time = np.arange(60)
+    translation = cmu_walk.take([60] * 60).translation.copy()
+    translation[:, 0, 0] += 0.0001 * time**2
+    rotation = cmu_walk.take([60] * 60).rotation.copy()
+    still = cmu_walk.with_motion(rotation, translation)
+    drifting = lay([still], loop=True).again.placement
+    assert np.linalg.norm(drifting.shift) > 0.03, "36 cm further on it is not where it was"
+    translation[:, 0, 0] = cmu_walk.translation[60, 0, 0] + 0.01 * np.sin(time / 9)
+    swaying = lay([cmu_walk.with_motion(rotation, translation)], loop=True).again.placement
+    assert swaying == Placement()
+    assert np.linalg.norm(lay([cmu_walk.slice(20, 100)], loop=True).again.placement.shift) > 0.5
+
+
 def test_backing_away_is_no_reason_to_turn_round(cmu_walk):
     """Who walks backwards and then forwards keeps facing the same way, and stays about there."""
     back = cmu_walk.slice(10, 65)

@@ -20,7 +20,7 @@ from interpose.geometry.ground import UP, turn, wrap
 from interpose.observation.continuing import goes_on
 from interpose.observation.gait import in_step
 from interpose.observation.observation import Gap
-from interpose.skeletons import find_humanoid
+from interpose.skeletons import JOINTS, find_humanoid
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import carriers, hips_of, moved
 from interpose.skeletons.fitting import fit
@@ -37,6 +37,8 @@ PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
 TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
 # Seconds that who stands takes to another pose, however near that is: in a frame velocities would jump.
 LEAST = 0.3
+# Joints, and metres by which they are elsewhere at most, of who stands in the end where they did before.
+FEET_AT, SAME_SPOT = ("LeftFoot", "RightFoot"), 0.03
 
 
 @dataclass(frozen=True)
@@ -182,6 +184,8 @@ def lay(
         # The beginning of a loop is no later part of a take: where it lies, and how high, tells nothing.
         before, ended, later = done[-1], laid[-1].stop, number < len(clips)
         way = _way(body, carried, before, clip, count, later) if align else _as_it_lies(before, clip, count)
+        if len(clips) == 1 and stands_still(body, first):
+            way = replace(way, placement=Placement())
         start = ended + way.frames
         gaps.append(Gap(ended, start))
         laid.append(Laid(clip.name, start, start + len(clip), way.placement, scale, way.why, way.in_step))
@@ -189,6 +193,15 @@ def lay(
         done += [held] * way.frames + [way.placement.of(clip, carried)]
     again = laid.pop() if loop else None
     return Timeline(first.joined(done), gaps, laid, again)
+
+
+def stands_still(body: Humanoid, clip: Clip) -> bool:
+    """Whether somebody stands in the end where they stood in the beginning: sway leads nobody on."""
+    if not body.mapping.usable or len(clip) < 2:
+        return False
+    stands = all(np.linalg.norm(end(body, clip, frame).velocity) < STANDS for frame in (0, -1))
+    feet = body.positions(clip.take([0, len(clip) - 1]))[:, [JOINTS.index(name) for name in FEET_AT]]
+    return bool(stands and np.linalg.norm(feet[1] - feet[0], axis=-1).max() < SAME_SPOT)
 
 
 @dataclass(frozen=True)
