@@ -20,7 +20,7 @@ from interpose.geometry.ground import UP, turn, wrap
 from interpose.observation.continuing import goes_on
 from interpose.observation.gait import in_step
 from interpose.observation.observation import Gap
-from interpose.skeletons import JOINTS, find_humanoid
+from interpose.skeletons import FEET, find_humanoid
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import carriers, hips_of, moved
 from interpose.skeletons.fitting import fit
@@ -37,8 +37,8 @@ PACE = 1.3  # metres a second: at which adults like to walk (Bohannon 1997)
 TURN, RISE, CHANGE, STEP = 180.0, 0.5, 2.0, 0.5
 # Seconds that who stands takes to another pose, however near that is: in a frame velocities would jump.
 LEAST = 0.3
-# Joints, and metres by which they are elsewhere at most, of who stands in the end where they did before.
-FEET_AT, SAME_SPOT = ("LeftFoot", "RightFoot"), 0.03
+# Metres by which the feet of who stands in the end where they did before are elsewhere at most.
+SAME_SPOT = 0.03
 
 
 @dataclass(frozen=True)
@@ -200,7 +200,7 @@ def stands_still(body: Humanoid, clip: Clip) -> bool:
     if not body.mapping.usable or len(clip) < 2:
         return False
     stands = all(np.linalg.norm(end(body, clip, frame).velocity) < STANDS for frame in (0, -1))
-    feet = body.positions(clip.take([0, len(clip) - 1]))[:, [JOINTS.index(name) for name in FEET_AT]]
+    feet = body.positions(clip.take([0, len(clip) - 1]))[:, list(FEET)]
     return bool(stands and np.linalg.norm(feet[1] - feet[0], axis=-1).max() < SAME_SPOT)
 
 
