@@ -45,15 +45,17 @@ def test_the_arm_is_the_other_s_and_the_body_the_method_s(cmu_walk, part, method
 
 def test_on_a_body_that_is_known_the_arm_points_where_it_did(cmu_walk, part):
     """As seen from where the hips face; here of a body that leans, and faces elsewhere."""
-    lean = rotations.multiply(rotations.about("Y", np.array(2.0)), rotations.about("X", np.array(0.4)))
+    lean = rotations.multiply(rotations.about("Y", np.array(2.0)), rotations.about("Z", np.array(0.4)))
     rotation = cmu_walk.rotation.copy()
     rotation[:, 0] = rotations.multiply(lean, rotation[:, 0])
     leaning = cmu_walk.with_motion(rotation, cmu_walk.translation)
     done = interpose.fill(leaning, [Gap(75, 105, ARM)], parts=part).clip
 
     def aims(clip, frames):
-        turned = clip.slice(*frames).kinematics()[0]
-        faces = rotations.twist_about(turned[:, 0], np.array([0.0, 1.0, 0.0]))
+        turned, placed = clip.slice(*frames).kinematics()
+        left, right = (placed[:, clip.skeleton.index(side + "UpLeg")] for side in ("Left", "Right"))
+        across = left - right
+        faces = rotations.about("Y", np.arctan2(-across[:, 2], across[:, 0]))
         arm = turned[:, [clip.skeleton.index(name) for name in ARM]]
         return rotations.multiply(rotations.conjugate(faces)[:, None], arm)
 
@@ -61,6 +63,23 @@ def test_on_a_body_that_is_known_the_arm_points_where_it_did(cmu_walk, part):
     assert apart.max() < 1e-6
     others = [i for i, name in enumerate(cmu_walk.skeleton.names) if name not in ARM]
     assert done.rotation[:, others].tobytes() == leaning.rotation[:, others].tobytes()
+
+
+def test_shoulder_blades_stay_in_their_sockets(cmu_walk, part):
+    """A blade that took up how the two trunks differ would leave it; the arm still points where it did."""
+    joints = ("RightShoulder", *ARM)
+    lean = rotations.multiply(cmu_walk.rotation[:, 0], rotations.about("Z", np.array(0.4)))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = lean
+    leaning = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    done = interpose.fill(leaning, [Gap(75, 105, joints)], parts=replace(part, joints=joints)).clip
+    other, mine = part.clip, done.skeleton
+    blade = [clip.skeleton.index("RightShoulder") for clip in (other, done)]
+    assert rotations.angle(done.rotation[85:93, blade[1]], other.rotation[40:48, blade[0]]).max() < 1e-9
+    plain = interpose.fill(leaning, [Gap(75, 105, joints)], parts=replace(part, joints=joints[1:])).clip
+    arm = mine.index("RightArm")
+    turned = [clip.slice(85, 93).kinematics()[0][:, arm] for clip in (done, plain)]
+    assert rotations.angle(*turned).max() < 1e-6
 
 
 def test_what_the_gap_hid_has_no_influence(cmu_walk, part):

@@ -12,8 +12,12 @@ from interpose.errors import RequestError, unfit
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP
 from interpose.observation.observation import Observation, frame_number, joint_names
+from interpose.skeletons import JOINTS
+from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
 from interpose.skeletons.fitting import SAME
+from interpose.skeletons.humanoid import find_humanoid
+from interpose.skeletons.mapping import find_mapping
 
 
 @dataclass(frozen=True)
@@ -47,8 +51,8 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
     """The clip with the parts in it, and the observation that knows them.
 
     Where the body that a part hangs on is known it points where it does in the other clip, as seen from where
-    the hips face: an arm that waves over the head does so on a trunk that leans, too. Where the body is yet
-    to be filled a part keeps its local rotations.
+    the hips face: an arm that waves over the head does so on a trunk that leans, too. Shoulder blades keep
+    their local rotations, as they hardly move on a trunk, and so does a part whose body is yet to be filled.
 
     Raises:
         RequestError: frames or joints that are not there, a part that reaches out of the gaps, another frame
@@ -70,26 +74,41 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
 def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part) -> None:
     """Turn the topmost joints of a part, in `rotation` (F, J, 4), as `lay` says."""
     to, skeleton = slice(part.at, part.at + part.stop - part.start), clip.skeleton
-    hips, joints = hips_of(skeleton), {skeleton.index(name) for name in part.joints}
+    hips, mapping = hips_of(skeleton), find_mapping(skeleton)
+    blades = {mapping["LeftShoulder"], mapping["RightShoulder"]}
+    laid = [skeleton.index(name) for name in part.joints]
+    joints = {*laid} - blades
     tops = [
         joint
         for joint in joints
         if hips in (above := skeleton.ancestors(joint))
         and not joints & {*above}
-        and observation.rotation[to, [*above]].all()
+        and (observation.rotation[to, [*above]].all(axis=0) | np.isin(above, laid)).all()
     ]
     if not tops:
         return
-    here = clip.slice(to.start, to.stop).kinematics()[0]
-    there = part.clip.slice(part.start, part.stop).kinematics()[0]
-    other = part.clip.skeleton
-    mine = rotations.twist_about(here[:, hips], UP.values)
-    theirs = rotations.twist_about(there[:, hips_of(other)], UP.values)
-    between = rotations.multiply(mine, rotations.conjugate(theirs))
+    own = clip.with_motion(rotation, clip.translation).slice(to.start, to.stop)
+    others = part.clip.slice(part.start, part.stop)
+    here, there, other = own.kinematics()[0], others.kinematics()[0], others.skeleton
+    between = rotations.multiply(_ahead(own), rotations.conjugate(_ahead(others)))
     for joint in tops:
         aims = rotations.multiply(between, there[:, other.index(skeleton.names[joint])])
         parent = here[:, skeleton.parents[joint]]
         rotation[to, joint] = rotations.normalize(rotations.relative(parent, aims))
+
+
+def _ahead(clip: Clip) -> np.ndarray:
+    """(F, 4) the turn about the vertical to where the hips face.
+
+    A hip joint's own turn tells it where it rests as the body stands; LAFAN1's rests on its side, so that to
+    lean is to turn about the vertical, too.
+    """
+    if not find_mapping(clip.skeleton).usable:
+        turned = clip.kinematics()[0][:, hips_of(clip.skeleton)]
+        return rotations.twist_about(turned, UP.values)
+    placed = find_humanoid(clip).positions(clip)
+    pair = np.isin(JOINTS, ("LeftUpLeg", "RightUpLeg"))
+    return rotations.about("Y", facing(placed, np.broadcast_to(pair, placed.shape[:-1])))
 
 
 def _check(clip: Clip, observation: Observation, part: Part) -> None:
