@@ -247,6 +247,19 @@ def test_a_knee_that_bends_the_wrong_way_by_itself_is_found_and_bent_back(cmu_wa
     assert [one.joint for one in done.report.exchanged] == [name]
 
 
+def test_a_knee_that_bends_further_than_any_is_bent_back_where_it_jumps(cmu_walk):
+    """A squat of 140 degrees; whoever squats past half a turn comes and goes without a jump."""
+    clip = cmu_walk.slice(1, 209)
+    knee, rotation = clip.skeleton.index("LeftLeg"), clip.rotation.copy()
+    deeper = 2.0 * np.sin(np.pi * np.arange(208) / 207) ** 2
+    rotation[:, knee] = rotations.multiply(rotation[:, knee], rotations.about("X", deeper))
+    deep = clip.with_motion(rotation, clip.translation)
+    odd = put_back(deep, [Bend(80, 120, knee, find_humanoid(deep))])
+    (found,) = [one for one in exchanges(odd) if isinstance(one, Bend)]
+    assert (found.start, found.stop, found.shin) == (80, 120, knee)
+    assert not [one for one in exchanges(deep) if isinstance(one, Bend)]
+
+
 def test_where_both_knees_bend_the_wrong_way_all_along_nothing_is_bent(cmu_walk):
     """It is rather the body that is taken to face backwards."""
     clip = cmu_walk.slice(1, 209)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from tests.skeletons.rigs import under_root
 
+import interpose
 from interpose.clip import Clip, Skeleton
 from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.observation import Gap, Observation
 from interpose.observation.finding import Finding, to_gaps
-from interpose.observation.scan import scan
+from interpose.observation.scan import intact, scan
 
 NAMES = ("hips", "spine", "arm", "hand", "finger")
 SKELETON = Skeleton(NAMES, (-1, 0, 1, 2, 3), np.tile([0.0, 0.3, 0], (5, 1)))
@@ -504,3 +505,97 @@ def test_what_jumps_where_frames_are_repeated_is_judged_without_these(data):
     clip = load(data / "cmu_jump.bvh")
     twice = clip.take(np.repeat(np.arange(1, len(clip), 2), 2))
     assert {one.kind for one in scan(twice)} <= {"repeated"}
+
+
+def beside(clip: Clip, count: int, parent: str | None) -> Clip:
+    """The same motion with so many more joints that never move: props, or fingers below `parent`."""
+    old, above = clip.skeleton, -1 if parent is None else clip.skeleton.index(parent)
+    names, parents = [*old.names], [*old.parents]
+    for number in range(count):
+        names.append(f"more{number}")
+        parents.append(above)
+    rest = np.concatenate([old.rest_translation, np.tile([0.03, 0.0, 0.0], (count, 1))])
+    still = np.tile(rotations.identity(), (len(clip), count, 1))
+    return Clip(
+        Skeleton(names, parents, rest),
+        np.concatenate([clip.rotation, still], axis=1),
+        clip.translation if parent else np.pad(clip.translation, ((0, 0), (0, count), (0, 0))),
+        clip.fps,
+        clip.translated if parent else (*clip.translated, *range(len(old), len(names))),
+    )
+
+
+@pytest.mark.parametrize(("count", "parent"), [(40, None), (40, "LeftHand")])
+def test_props_and_fingers_that_never_move_say_nothing_of_the_body(cmu_walk, count, parent):
+    """Neither whether it stands in its rest pose nor how much it trembles."""
+    walk, rng = cmu_walk.slice(1, 209), np.random.default_rng(1)
+    rotation, translation = walk.rotation.copy(), walk.translation.copy()
+    rotation[170:], translation[170:] = rotation[169], translation[169]
+    held = walk.with_motion(rotation, translation)
+    assert spans(scan(beside(held, count, parent))) == spans(scan(held)) == [("frozen", None, 170, 208)]
+    noise = rotations.exp(np.radians(rng.normal(0, 1.5, (*walk.rotation.shape[:2], 3))))
+    noisy = walk.with_motion(rotations.multiply(walk.rotation, noise), walk.translation)
+    (plain,), (more,) = (
+        [one for one in scan(clip) if one.kind == "noisy"] for clip in (noisy, beside(noisy, count, parent))
+    )
+    assert plain.note == more.note
+
+
+def test_a_body_jumps_whatever_else_is_lost_meanwhile(cmu_walk):
+    clip = cmu_walk.slice(1, 200)
+    hand, rotation, translation = (
+        clip.skeleton.index("LeftHand"),
+        clip.rotation.copy(),
+        clip.translation.copy(),
+    )
+    rotation[:, hand] = rotation[0, hand]
+    translation[90:, 0, 0] += 0.6
+    found = scan(clip.with_motion(rotation, translation))
+    assert ("jump", None, 90, 91) in spans(found)
+    assert ("frozen", ("LeftHand",), 0, 199) in spans(found)
+
+
+def test_a_body_that_runs_jumps_as_far_as_one_that_stands(data):
+    clip = load(data / "cmu_run.bvh")
+    clip = clip.slice(1, len(clip))
+    assert not [one for one in scan(clip) if one.kind == "jump"]
+    translation, at = clip.translation.copy(), len(clip) // 2
+    translation[at:, 0] += 0.35 * np.array([0.6, 0.0, 0.8])
+    found = [one for one in scan(clip.with_motion(clip.rotation, translation)) if one.kind == "jump"]
+    assert [(one.joints, one.start) for one in found] == [(None, at)]
+
+
+@pytest.mark.parametrize("part", [slice(0, 20), slice(-20, None)])
+def test_a_limb_that_is_held_to_an_end_is_frozen(cmu_walk, part):
+    """It jumps at neither: its joints stop in the very same frames."""
+    clip = cmu_walk.slice(1, 200)
+    leg = [clip.skeleton.index(name) for name in ("LeftUpLeg", "LeftLeg", "LeftFoot")]
+    rotation = clip.rotation.copy()
+    rotation[part, leg] = rotation[part.stop if part.start == 0 else part.start - 1, leg]
+    held = clip.with_motion(rotation, clip.translation)
+    (found,) = [one for one in scan(held) if one.kind == "frozen"]
+    assert {"LeftUpLeg", "LeftLeg"} <= {*found.joints}
+    frames = range(len(clip))[part]
+    assert abs(found.start - frames[0]) <= 1
+    assert abs(found.stop - frames[-1] - 1) <= 1
+
+
+def test_who_stands_to_be_measured_stays(cmu_walk):
+    """To `recover` and `denoise`, too: a rest pose of less than a second is no snap then."""
+    walk = cmu_walk.slice(1, len(cmu_walk))
+    rotation = np.concatenate([np.repeat(walk.skeleton.rest_rotation[None], 24, axis=0), walk.rotation])
+    translation = np.concatenate([np.repeat(walk.translation[:1], 24, axis=0), walk.translation])
+    clip = walk.with_motion(rotation, translation)
+    assert intact(clip).rotation[:24].all()
+    for done in (interpose.recover(clip), interpose.denoise(clip)):
+        off = np.linalg.norm(done.clip.positions() - clip.positions(), axis=-1)[:23]
+        assert off.max() < 0.02
+
+
+def test_what_carries_the_body_need_not_turn_to_jump_away_and_back(cmu_walk):
+    walk = under_root(cmu_walk.slice(1, 200), goes=True)
+    translation = walk.translation.copy()
+    translation[90:95, 0] += [0.3, 0.0, 0.3]
+    found = [one for one in scan(walk.with_motion(walk.rotation, translation)) if one.kind != "noisy"]
+    assert ("lost", ("root",), 90, 95) in spans(found)
+    assert "jump" not in {one.kind for one in found}

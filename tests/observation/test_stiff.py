@@ -149,6 +149,20 @@ def test_what_leaps_from_a_wrong_pose_is_not_held(cmu_walk, frames):
     assert not [one for one in scan(clip) if "beside a jump" in one.note]
 
 
+def test_where_motion_was_cut_nothing_was_held(cmu_walk):
+    """All joints leap in that step, a leg that stood among them."""
+    clip = cmu_walk.slice(1, 209)
+    leg, rotation = below(clip, "LeftUpLeg"), clip.rotation.copy()
+    rng = np.random.default_rng(0)
+    noise = rotations.exp(np.radians(0.2) * rng.standard_normal((20, len(leg), 3)))
+    rotation[60:80, leg] = rotations.multiply(noise, rotation[60, leg])
+    stands = clip.with_motion(rotation, clip.translation)
+    assert [one.kind for one in scan(stands) if one.kind == "frozen"] == ["frozen"]
+    kept = np.delete(np.arange(208), np.arange(80, 100))
+    cut = stands.with_motion(rotation[kept], clip.translation[kept])
+    assert [one.kind for one in scan(cut)] == ["jump"]
+
+
 def test_people_who_walk_run_and_jump_are_not_stiff(cmu_walk, data):
     from interpose.formats import load
 

@@ -29,7 +29,7 @@ from interpose.methods.protocol import Raw
 from interpose.observation import Observation
 from interpose.observation.broken import medians
 from interpose.observation.scan import intact
-from interpose.observation.tremor import FEWEST, SLOWEST, bursts, deviation, restless
+from interpose.observation.tremor import FEWEST, SLOWEST, body_of, bursts, deviation, restless
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, line_of, placed
 from interpose.skeletons.targets import seated
@@ -255,7 +255,7 @@ def _report(
         start,
         start + len(clip),
         strength,
-        100 * float(noise.mean()),
+        100 * float(noise[body_of(clip)].mean()),
         float(moved.mean()),
         float(moved.max()),
         float(turned.mean()),

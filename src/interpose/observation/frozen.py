@@ -10,6 +10,7 @@ from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation.broken import AROUND
+from interpose.observation.corruption import LIMBS
 from interpose.observation.finding import NO_GAPS, STUCK, Finding, spoken_of
 from interpose.observation.repeated import pace
 from interpose.observation.splined import splined
@@ -36,6 +37,10 @@ JUMP_WAY = 0.02
 EXPECTED_TURN, EXPECTED_WAY = 0.2, 0.2
 APART = 3  # frames by which what is held at once may begin and end apart
 CALIBRATION = 0.5  # seconds for which a rest pose at an end is held to be measured
+MEASURED = ", in the rest pose, as for measuring"
+# Seconds for which joints of one limb stand still in the very same frames to an end of the clip: a tracker
+# that loses a limb there jumps at no end.
+TO_AN_END = 0.3
 
 
 def stuck(clip: Clip) -> list[Finding]:
@@ -62,6 +67,16 @@ def frozen(steps: Steps, findings: list[Finding]) -> list[Finding]:
     """`findings`, and all that is frozen; joints and places that are held at once are one."""
     findings = findings + _runs_of(steps) + _dead(steps)
     return _joined(steps.clip, findings + _held_place(steps.clip, findings))
+
+
+def measured(clip: Clip) -> np.ndarray:
+    """(F,) the frames in which somebody stands in the rest pose to be measured."""
+    there = np.zeros(len(clip), bool)
+    for one in _runs_of(Steps.of(clip)) if len(clip) > 2 else ():
+        if one.note.endswith(MEASURED):
+            part = slice(max(one.start - 1, 0), one.stop + 1)  # with the frame that is held
+            there[part] |= (clip.rotation[part] == clip.rotation[one.start]).all(axis=(1, 2))
+    return there
 
 
 def _runs_of(steps: Steps) -> list[Finding]:
@@ -95,17 +110,17 @@ def _frozen_poses(steps: Steps, whole: np.ndarray, alive: np.ndarray) -> tuple[l
         if run.stop - run.start < steps.shortest:
             continue
         begin, end = steps.first + run.start, steps.first + run.stop
-        rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin]) < LIFELESS
+        rests = rotations.angle(clip.skeleton.rest_rotation, clip.rotation[begin])[alive] < LIFELESS
         # Who stands in the rest pose does so to be measured.
         rest = rests.mean() > 0.5
         at_end = run.start == 0 or run.stop == len(whole)
-        measured = rest and end - begin >= CALIBRATION * clip.fps and at_end
+        there = rest and end - begin >= CALIBRATION * clip.fps and at_end
         calm = rest or _pace_beside(clip, begin, end) <= PACE
         lost = run.jumps_in or run.jumps_out or not calm
-        why = ", in the rest pose, as for measuring" if measured else ""
-        found.append(steps.finding("frozen" if lost and not measured else "still", None, run, why))
+        why = MEASURED if there else ""
+        found.append(steps.finding("frozen" if lost and not there else "still", None, run, why))
         # Where that is, is as real.
-        stands[run.start : run.stop] |= measured
+        stands[run.start : run.stop] |= there
     return found, stands
 
 
@@ -116,6 +131,7 @@ def _frozen_joints(steps: Steps, whole: np.ndarray, alive: np.ndarray) -> list[F
     lively = [joint for joint in alive.tolist() if _lively(still[:, joint] & ~whole, still[:, joint])]
     together: dict[Run, list[int]] = {}
     pauses: dict[tuple[int, int], list[int]] = {}
+    to_an_end: dict[Run, list[int]] = {}
     turnless = still[:, lively].all(axis=1) & ~whole & (len(lively) >= MANY)
     for run in zero_runs(turnless, turned[:, lively].max(axis=1, initial=0.0), steps.jump(lively)):
         if run.stop - run.start >= steps.shortest:
@@ -128,10 +144,18 @@ def _frozen_joints(steps: Steps, whole: np.ndarray, alive: np.ndarray) -> list[F
             value = clip.rotation[steps.first + run.start, joint]
             at_limit = rotations.angle(clip.skeleton.rest_rotation[joint], value) < LIFELESS
             told = not at_limit and not steps.rounded[joint]
-            if _suspicious(run, steps, np.nanmean(own) / EXPECTED_TURN * told):
+            usual = np.nanmean(own) / EXPECTED_TURN * told
+            if _suspicious(run, steps, usual):
                 together.setdefault(run, []).append(joint)
             elif len(run) >= steps.shortest:
                 pauses.setdefault((run.start, run.stop), []).append(joint)
+                at_end = run.start == 0 or run.stop == len(still)
+                if at_end and len(run) >= TO_AN_END * clip.fps and len(run) * usual >= 1:
+                    to_an_end.setdefault(run, []).append(joint)
+    mapped = find_mapping(clip.skeleton).joints
+    for run, joints in to_an_end.items():
+        if any(len({*joints} & {mapped[row] for row in rows}) > 1 for rows in LIMBS):
+            together.setdefault(run, []).extend(joints)
     found = []
     for run, joints in together.items():
         joints = sorted({*joints, *pauses.pop((run.start, run.stop), [])})
@@ -242,7 +266,7 @@ def but_whole(findings: list[Finding], stiff: list[Finding]) -> list[Finding]:
 def held_or_led(clip: Clip, findings: list[Finding]) -> list[Finding]:
     """Joints that are held with a tremble, led straight, or splined; not what has been found already, and not
     beside a pose that stands still: what moves little there sets off."""
-    apart = [one for one in findings if one.kind == "still" or one.kind not in NO_GAPS]
+    apart = [one for one in findings if one.kind in ("still", "frozen body") or one.kind not in NO_GAPS]
     names, lost = clip.skeleton.names, spoken_of(clip, apart)
     found = []
     for joints, start, stop in held(clip, lost.copy()):

@@ -14,14 +14,14 @@ from interpose.geometry.time import runs
 from interpose.observation.broken import AROUND, broken
 from interpose.observation.exchange import crossovers, exchanges, put_back
 from interpose.observation.finding import STUCK, Finding, spoken_of
-from interpose.observation.frozen import but_whole, frozen, held_or_led
+from interpose.observation.frozen import but_whole, frozen, held_or_led, measured
 from interpose.observation.observation import Observation
 from interpose.observation.repeated import but_repeated, doubled, repeated, repeats
 from interpose.observation.steps import STILL, Steps, turns
 from interpose.observation.stiff import TELEPORTS, TIMES
-from interpose.observation.tremor import FEWEST, NOISY, bursts, deviation, restless
+from interpose.observation.tremor import FEWEST, NOISY, body_of, bursts, deviation, restless
 from interpose.skeletons.carrier import STILL as UNMOVED
-from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.carrier import hips_of, placed
 
 OR = "or in all other frames"  # where limbs change sides once, nobody knows which side of it is wrong
 TOLD = 1 / 3  # of the frames in which a joint trembles: found otherwise, it is that
@@ -125,10 +125,13 @@ def strays(clip: Clip) -> list[int]:
 
 def intact(clip: Clip) -> Observation:
     """What is left of a clip without values that were lost for moments, as `broken`: where frames are
-    repeated, in steps that are none, by the others."""
+    repeated, in steps that are none, by the others. Who stands in the rest pose to be measured is there."""
     again = repeats(clip)
     if not again.any():
-        return broken(clip)
+        seen = broken(clip)
+        there = measured(clip)
+        seen.rotation[there], seen.translation[there] = True, True
+        return seen
     kept = ~again
     seen = broken(replace(clip.take(kept), fps=clip.fps * float(kept.mean())))
     at = np.cumsum(kept) - 1
@@ -145,7 +148,12 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
     seen = intact(clip)
     # Joints that stand still for most of the clip have no data to be restored from, but for spikes.
     gone = ~(seen.rotation & seen.translation) & ~spoken_of(clip, findings)
-    for joint in np.flatnonzero((turns(clip) > STILL).mean(axis=0) <= 0.5):
+    steady = (turns(clip) > STILL).mean(axis=0) <= 0.5
+    # But what carries the body need not turn.
+    placing = placed(clip)
+    steps = np.diff(clip.translation[:, [clip.translated.index(joint) for joint in placing]], axis=0)
+    steady[placing] &= (np.linalg.norm(steps, axis=-1) > STILL).mean(axis=0) <= 0.5
+    for joint in np.flatnonzero(steady):
         for start, stop in runs(gone[:, joint]):
             gone[start:stop, joint] = stop - start <= AROUND
     together: dict[tuple[int, int], list[str]] = {}
@@ -161,17 +169,28 @@ def _lost(clip: Clip, findings: list[Finding]) -> list[Finding]:
 
 def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
     """Where the body, or joints of it, are elsewhere from one frame to the next; not beside what has been
-    found already, which begins and ends so."""
+    found already, which begins and ends so, nor within it what hangs from what is lost."""
     positions, hips = clip.positions(), hips_of(clip.skeleton)
     around = positions - positions[:, [hips]]
     around[:, hips] = positions[:, hips]
     seen = known.positions(clip.skeleton)
-    steps = np.linalg.norm(np.diff(around, axis=0), axis=-1)
-    steps[~(seen[1:] & seen[:-1])] = 0.0
-    beside = ndimage.maximum_filter(steps, footprint=[[1]] * 3 + [[0]] + [[1]] * 3, mode="nearest")
-    jumps = (steps > TELEPORTS) & (steps > TIMES * beside)
+    seen = seen[1:] & seen[:-1]
+    ways = np.diff(around, axis=0)
+    steps = np.linalg.norm(ways, axis=-1)
+    # A body that runs goes as far in every step as one that stands jumps.
+    unlike = ways[:, hips] - ndimage.median_filter(ways[:, hips], size=(7, 1), mode="nearest")
+    measured = steps.copy()
+    measured[:, hips] = np.linalg.norm(unlike, axis=-1)
+    measured[~seen] = 0.0
+    beside = ndimage.maximum_filter(measured, footprint=[[1]] * 3 + [[0]] + [[1]] * 3, mode="nearest")
+    jumps = (measured > TELEPORTS) & (measured > TIMES * beside)
+    skeleton = clip.skeleton
     for one in findings:
-        jumps[max(one.start - 2, 0) : one.stop + 1] = False
+        own = [*range(len(skeleton))] if one.joints is None else [*map(skeleton.index, one.joints)]
+        hanging = skeleton.below[:, own].any(axis=1)
+        jumps[max(one.start - 2, 0) : one.stop + 1, hanging] = False
+        for end in (one.start, one.stop):
+            jumps[max(end - 2, 0) : end + 1] = False
     found = []
     for step in np.flatnonzero(jumps.any(axis=1)).tolist():
         joint = int(steps[step].argmax())
@@ -188,7 +207,7 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
     if not known.complete or len(clip) < FEWEST:
         return []
     clip = _led_over(clip, findings)
-    places = clip.positions()
+    places = clip.positions()[:, body_of(clip)]
     all_along = [(0, len(clip))] if deviation(places).mean() > NOISY else []
     found = [
         Finding(

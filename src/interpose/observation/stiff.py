@@ -34,6 +34,8 @@ MOST, NEARLY = 3, 0.9  # so many limbs, and such a share of all joints, are all 
 # and than so many times as far as in those around: of 112,000 frames of all data sets 18, which are glitches.
 TELEPORTS, TIMES = 0.1, 5.0
 PLACE, BRIEF = 0.01, 0.1  # metres within which a place is held with a tremble, and seconds for which at least
+# Where so many of the other joints leap in the same step nothing was held before: the motion was cut there.
+CUT = 0.25
 ALIVE = 0.5  # of what the rest of the body usually turns, at least, meanwhile: who stands still is not held
 # It ends where it stays further from its mean than by so many times what it trembles by in .3 s beside the
 # leap, or by so much (radians): what moved slowly before is real.
@@ -53,6 +55,10 @@ SAME = 1.5e-4  # radians: files round
 ANIMATED = 0.7
 
 
+# A limb: its joints, the frames start to stop - 1 in which it is held, and the step in which it leaps.
+Group = tuple[tuple[int, ...], int, int, int]
+
+
 def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, int]]:
     """Limbs, or ends of them, that are held and tremble: their joints, and the frames start to stop - 1.
 
@@ -61,12 +67,12 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
     turned, places, skeleton = rotations.continuous(clip.rotation), clip.positions(), clip.skeleton
     steps = 2.0 * np.linalg.norm(np.diff(turned, axis=0), axis=-1)
     mapping = find_mapping(skeleton)
-    groups: list[tuple[tuple[int, ...], int, int]] = []
+    groups: list[Group] = []
     for rows in LIMBS:
         joints = [mapping.joints[row] for row in rows if not JOINTS[row].endswith("Toe")]
         limb = [joint for joint in joints if joint is not None]
         found = [
-            (joint, start, stop)
+            (joint, start, stop, step)
             for joint in limb
             for start, stop, step in _still(turned[:, joint], steps[:, joint], lost[:, joint], clip.fps)
             if _leaps(places, step, joint, skeleton)
@@ -76,15 +82,15 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
                 one for one in found if abs(one[1] - found[0][1]) <= NEAR or abs(one[2] - found[0][2]) <= NEAR
             ]
             found = [one for one in found if one not in alike]
-            start, stop = (int(np.median([one[side] for one in alike])) for side in (1, 2))
+            start, stop, step = (int(np.median([one[side] for one in alike])) for side in (1, 2, 3))
             below = [
                 j for j in range(len(skeleton)) if j == alike[0][0] or alike[0][0] in skeleton.ancestors(j)
             ]
             if len({one[0] for one in alike}) > 1 or stop - start >= ALONE * clip.fps:
-                groups.append((tuple(below), start, stop))
+                groups.append((tuple(below), start, stop, step))
     ends: list[int] = []
     for same in sorted(_at_once(groups), key=len, reverse=True):
-        _, start, stop = same[0]
+        _, start, stop, _ = same[0]
         if len(same) >= MOST and _whole(turned[start:stop]):
             ends += [start, stop]
             before = np.linalg.norm(np.diff(places[max(0, start - NEAR) : start], axis=0), axis=-1) * clip.fps
@@ -92,7 +98,10 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
             if before.size and before.mean() > PACE:
                 yield tuple(range(len(skeleton))), start, stop
             continue
-        for part, start, stop in same:
+        others = np.delete(steps, [joint for part, *_ in same for joint in part], axis=1)
+        for part, start, stop, step in same:
+            if _cut(others, step):
+                continue
             # What leaps to a pose that is held, or from it, does not because it is held itself.
             if any(min(abs(end - start), abs(end - stop)) <= NEAR for end in ends):
                 continue
@@ -101,12 +110,19 @@ def held(clip: Clip, lost: np.ndarray) -> Iterator[tuple[tuple[int, ...], int, i
                 yield part, start, stop
 
 
-def _at_once(
-    groups: list[tuple[tuple[int, ...], int, int]],
-) -> Iterator[list[tuple[tuple[int, ...], int, int]]]:
+def _cut(steps: np.ndarray, step: int) -> bool:
+    """Whether joints that turn by `steps` (F - 1, n) from frame to frame leap in one of these."""
+    part, at = steps[max(0, step - NEAR) : step + NEAR + 1], min(step, NEAR)
+    beside = np.delete(part, at, axis=0).max(axis=0, initial=0.0)
+    moving = steps.max(axis=0, initial=0.0) > LEAP
+    leap = (part[at] > LEAP) & (part[at] > OWN * beside)
+    return bool(leap[moving].sum() > CUT * moving.sum())
+
+
+def _at_once(groups: list[Group]) -> Iterator[list[Group]]:
     """Limbs that are held, in lists of those that are so at the same time."""
     while groups:
-        _, start, stop = groups[0]
+        _, start, stop, _ = groups[0]
         same = [one for one in groups if max(abs(one[1] - start), abs(one[2] - stop)) <= NEAR]
         groups = [one for one in groups if one not in same]
         yield same

@@ -9,6 +9,7 @@ from scipy.special import gammaincinv
 from interpose.clip import Clip
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
+from interpose.skeletons import find_mapping
 
 # The fourth difference of a signal: weights, and how much it amplifies white noise.
 DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
@@ -51,7 +52,15 @@ def bursts(clip: Clip) -> list[tuple[int, int]]:
     """
     if not _tells(clip):
         return []
-    return _ranges(trembling(clip.positions()).mean(axis=1, keepdims=True), NOISY, clip, 1.0)[0]
+    places = clip.positions()[:, body_of(clip)]
+    return _ranges(trembling(places).mean(axis=1, keepdims=True), NOISY, clip, 1.0)[0]
+
+
+def body_of(clip: Clip) -> list[int]:
+    """The joints whose mean tells of a body: without the fingers, props and lights that a file may have, too;
+    all of what is no humanoid."""
+    mapping = find_mapping(clip.skeleton)
+    return list(mapping.mapped[1]) if mapping.usable else [*range(len(clip.skeleton))]
 
 
 def restless(clip: Clip) -> list[tuple[int, int, tuple[int, ...]]]:
