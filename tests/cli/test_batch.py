@@ -70,6 +70,27 @@ def test_a_folder_without_clips_is_said(run, takes):
     assert "no motion file in it" in done.err
 
 
+def test_links_to_nothing_and_closed_folders_are_not_left_out(run, takes, monkeypatch):
+    (takes / "c.bvh").unlink()
+    (takes / "d.bvh").symlink_to("nowhere.bvh")
+    closed, look = takes / "closed", os.scandir
+    closed.mkdir()
+
+    def scandir(path):  # type: ignore[no-untyped-def]
+        if Path(path) == Path("takes/closed"):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return look(path)
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    done = run("scan", "takes", "--json")
+    assert done.code == 3
+    told = {Path(one["input"]).name: one for one in done.json}
+    assert {*told} == {"a.bvh", "b.bvh", "closed", "d.bvh"}
+    assert told["closed"]["why"] == "Permission denied"
+    assert "link to nowhere.bvh" in told["d.bvh"]["why"]
+    assert run("scan", "takes/closed", "--json").code == 3
+
+
 def test_results_go_into_a_folder_and_folders_within_folders_are_looked_into(run, takes):
     (takes / "day").mkdir()
     (takes / "c.bvh").rename(takes / "day" / "c.bvh")

@@ -311,3 +311,20 @@ def test_against_pymotion(data, tmp_path, make_bvh, body):
         theirs, _ = fk(rots, pos[:, 0], offsets, parents)
         if path.stem == "cmu_walk":
             np.testing.assert_allclose(clip.positions(), theirs * clip.source.unit, atol=1e-6)
+
+
+@pytest.mark.parametrize("replaces", [True, False])
+@pytest.mark.parametrize("low", [False, True])
+def test_hips_whose_offset_is_a_place_far_away_are_as_high_as_they_are(tmp_path, make_bvh, replaces, low):
+    """On the other side of the origin: their height tells, and not that they are nowhere near."""
+    hips = [("Root", 0, (0.0, 0.0, 0.0), "xyzZXY"), ("Hips", 1, (209.3, 92.7, -309.3), "xyzZXY")]
+    joints = [*hips, ("Spine", 2, (0.0, 20.0, 0.0), "ZXY")]
+    rng = np.random.default_rng(0)
+    values = np.zeros((60, 15))
+    way = np.linspace(0, 150 if replaces else 30, 60)
+    heights = 20.0 if low else 80.0
+    place = np.stack([-230.0 - way, heights + rng.normal(0, 2, 60), -235.0 - 0.5 * way], axis=1)
+    values[:, 6:9] = place if replaces else place - place[0]
+    path = tmp_path / "a.bvh"
+    path.write_text(make_bvh(joints, values))
+    assert formats.load(path).source.positions == ("replace" if replaces else "add")

@@ -201,6 +201,20 @@ def test_names_are_read_character_by_character(cmu_walk):
     assert both.names[mapping["LeftHand"]] == "Bob_LeftHand"
 
 
+@pytest.mark.parametrize("extras", [0, 120])
+def test_what_names_share_is_their_own_word(cmu_walk, extras):
+    """Not the first word of whichever joint comes first: of a root that is called otherwise, or of a body
+    below which most joints are of a face."""
+    old = cmu_walk.skeleton
+    body = old.names if extras else tuple(f"Hero_{name}" for name in old.names)
+    names = ("Scene_Root", *body, *(f"Face_{number:02d}" for number in range(extras)))
+    head = 1 + old.index("Head")
+    parents = (-1, *(parent + 1 for parent in old.parents), *[head] * extras)
+    rest = np.concatenate([np.zeros((1, 3)), old.rest_translation, np.tile([0.0, 0.02, 0.05], (extras, 1))])
+    mapping, plain = find_mapping(Skeleton(names, parents, rest)), find_mapping(old)
+    assert mapping.joints == tuple(None if joint is None else joint + 1 for joint in plain.joints)
+
+
 def test_bones_without_length_are_no_body(cmu_walk):
     flat = replace(cmu_walk.skeleton, rest_translation=np.zeros((31, 3)))
     assert not find_mapping(flat).usable

@@ -202,9 +202,13 @@ def _made(folder: Path) -> list[Path]:
 
 
 def _empty(folder: Path) -> FileError:
-    """That there is no clip in a folder."""
-    why = f"there is no motion file in it ({', '.join(MOTION)})"
-    return FileError(f"cannot read {folder}", why, "Name a folder with clips, or a clip.")
+    """That there is no clip in a folder, or that nobody may look into it."""
+    why, fix = f"there is no motion file in it ({', '.join(MOTION)})", "Name a folder with clips, or a clip."
+    try:
+        next(os.scandir(folder), None)
+    except OSError as error:
+        why, fix = str(error.strerror or error), "Allow it to be read, or leave it out."
+    return FileError(f"cannot read {folder}", why, fix)
 
 
 def _apart(found: list[tuple[Path, Path]]) -> None:
@@ -225,13 +229,13 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
     belongs in another folder.
 
     Without what verbs have made of them, and what lies in the folder that results go to. A folder without any
-    stands for itself, to be complained of.
+    stands for itself, to be complained of, as do folders that cannot be read and links to nothing.
     """
     for path in paths:
         if not path.is_dir():
             yield path, Path(path.name)
             continue
-        held = sorted(one for one in _within(path) if one.suffix.lower() in MOTION and one.is_file())
+        held = sorted(one for one in _within(path) if one.is_dir() or _is_clip(one))
         names, into = {*held}, output.resolve() if output is not None else None
         found = False
         for one in held:
@@ -244,16 +248,23 @@ def clips(paths: Iterable[Path], output: Path | None = None) -> Iterator[tuple[P
             yield path, Path(path.name)
 
 
+def _is_clip(path: Path) -> bool:
+    """Whether a path in a folder is a motion file, or a link that was to one."""
+    return path.suffix.lower() in MOTION and (path.is_file() or not path.exists())
+
+
 def _within(folder: Path) -> Iterator[Path]:
-    """The files in a folder and the folders in it, linked ones, too, each of them once."""
-    been: set[str] = set()
+    """The files in a folder and the folders in it, linked ones, too, each of them once; and those of the
+    folders that cannot be read."""
+    been, closed = set[str](), list[OSError]()
     links = [str(folder)]
     while links:
         # What a link leads to is looked into last: it may lie in the folder as well.
-        for place, folders, files in os.walk(links.pop(0)):
+        for place, folders, files in os.walk(links.pop(0), onerror=closed.append):
             if (real := os.path.realpath(place)) in been:
                 folders.clear()
                 continue
             been.add(real)
             links += sorted(path for name in folders if os.path.islink(path := os.path.join(place, name)))
             yield from (Path(place, name) for name in files)
+    yield from (Path(error.filename) for error in closed)

@@ -182,6 +182,8 @@ def _check_readable(path: Path) -> None:
         folder = path.parent
         if not folder.is_dir():
             raise FileError(what, f"there is no folder {folder}", "Check the spelling.")
+        if path.is_symlink():
+            raise FileError(what, f"it is a link to {path.readlink()}, which is not there", "Mend the link.")
         near = difflib.get_close_matches(path.name, [p.name for p in folder.iterdir()], n=3)
     except (OSError, ValueError) as error:
         if isinstance(error, FileError):

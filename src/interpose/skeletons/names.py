@@ -75,27 +75,27 @@ def words(name: str) -> list[str]:
     return [word.lower() for word in CUT.findall(re.split(r"[:|]", name)[-1])]
 
 
-def _shared(named: list[list[str]]) -> int:
-    """How many first words (nearly) all names share: a prefix of the tool or of the character."""
-    count = 0
+def _shared(named: list[list[str]]) -> list[str]:
+    """The first words that (nearly) all names share: a prefix of the tool or of the character."""
+    shared: list[str] = []
     while True:
-        firsts = [one[count] for one in named if len(one) > count + 1]
+        count = len(shared)
+        firsts = [one[count] for one in named if len(one) > count + 1 and one[:count] == shared]
         common = max(set(firsts), key=firsts.count, default="")
         if (
             len(firsts) < 3
             or firsts.count(common) < 0.8 * len(named)
             or common in MEANING | dict.fromkeys(LEFT | RIGHT)
         ):
-            return count
-        count += 1
+            return shared
+        shared.append(common)
 
 
 def read(names: tuple[str, ...]) -> list[Said]:
     """What the names of a skeleton's joints say."""
     cut = [words(name) for name in names]
     prefix = _shared(cut)
-    first = next((one[:prefix] for one in cut if len(one) > prefix), [])
-    return [_say(one[prefix:] if one[:prefix] == first else one) for one in cut]
+    return [_say(one[len(prefix) :] if one[: len(prefix)] == prefix else one) for one in cut]
 
 
 def _say(cut: list[str]) -> Said:
