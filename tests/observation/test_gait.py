@@ -90,6 +90,17 @@ def test_who_does_nothing_but_stand_goes_round(walk):
     assert found.stop + found.frames - found.start > 60
 
 
+def test_who_stands_and_then_walks_off_stands_to_go_round(walk):
+    """No part of the walk comes back, and the rest hardly moves."""
+    at = np.concatenate([np.full(100, 5), np.arange(5, 20)])
+    time = np.arange(len(at))[:, None] / 30
+    sway = 0.02 * np.sin(2.1 * time + np.arange(len(walk.skeleton)))
+    rotation = rotations.multiply(walk.rotation[at], rotations.exp(sway[..., None] * [1.0, 0.0, 0.0]))
+    found = tasks.cycle(walk.with_motion(rotation, walk.translation[at]))
+    assert found.stop <= 103
+    assert found.stop + found.frames - found.start > 60
+
+
 def test_of_ways_to_go_round_the_first_one_counts_that_closes_well(walk, monkeypatch):
     """Where all are flagged, the one in which feet slide least."""
     found = cycles(find_humanoid(walk), walk)
@@ -104,9 +115,19 @@ def test_of_ways_to_go_round_the_first_one_counts_that_closes_well(walk, monkeyp
         )
         return lambda *_, **__: SimpleNamespace(report=SimpleNamespace(gaps=[next(reports)]))
 
+    still = np.zeros(len(walk.skeleton))
+    monkeypatch.setattr(stitching, "_jumps", lambda *_: still)
     for slides, flagged, chosen in (([9.0, 9.0, 9.0], 0, 0), ([50.0, 9.0, 5.0], 1, 1)):
         monkeypatch.setattr(stitching, "stitch", closing(slides, flagged))
         assert tasks.cycle(walk).start == found[chosen][0]
+    # A hand that is elsewhere snaps in a way back that nothing is flagged of.
+    hand = still.copy()
+    hand[walk.skeleton.index("LeftHand")] = 1.0
+    jumps = iter([hand, *[still] * 9])
+    monkeypatch.setattr(stitching, "stitch", closing([9.0] * 9, 0))
+    monkeypatch.setattr(stitching, "_jumps", lambda *_: next(jumps))
+    assert tasks.cycle(walk).start == found[1][0]
+    monkeypatch.setattr(stitching, "_jumps", lambda *_: still)
     # In a way back that is too short to be asked about feet may skid all the same: the next is calm.
     slides = [50.0 if k < len(found) else 9.0 for k in range(2 * len(found))]
     monkeypatch.setattr(stitching, "stitch", closing(slides, 0))

@@ -121,7 +121,8 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
 
     Those that are most alike first, from SHORTEST to ROUND seconds apart, of those between which it moves as
     the whole of it does: who stands is most alike; a few at most, each half of SHORTEST apart from others.
-    Of who does nothing but stand the longest first. None where nothing comes back.
+    Of who does nothing but stand, or stands and does nothing else twice, the longest first. None where
+    nothing comes back.
     """
     least, most = max(1, round(SHORTEST * clip.fps)), min(round(ROUND * clip.fps), len(clip) - 1)
     if least > most:
@@ -137,15 +138,21 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
     # What hardly moves is like itself from frame to frame, and what never comes back is nowhere.
     usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
     idles = CLOSES * usual < NEARLY
-    within = NEARLY if idles else CLOSES * usual
-    found = []
-    for lag in range(least, most + 1):
-        apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
-        apart[gone[lag:] - gone[:-lag] < LIVELY * lag * gone[-1] / len(clip)] = np.inf
-        apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
-        beside = np.pad(apart, 1, constant_values=np.inf)
-        at = np.flatnonzero((apart < beside[:-2]) & (apart <= beside[2:]) & (apart <= within))
-        found += [(float(apart[i]), int(i), int(i) + lag) for i in at[np.argsort(apart[at])[:MOST]]]
+
+    def alike(within: float, lively: float) -> list[tuple[float, int, int]]:
+        found = []
+        for lag in range(least, most + 1):
+            apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
+            apart[gone[lag:] - gone[:-lag] < lively * lag * gone[-1] / len(clip)] = np.inf
+            apart += TURNED * np.abs(faces[lag:] - faces[:-lag])
+            beside = np.pad(apart, 1, constant_values=np.inf)
+            at = np.flatnonzero((apart < beside[:-2]) & (apart <= beside[2:]) & (apart <= within))
+            found += [(float(apart[i]), int(i), int(i) + lag) for i in at[np.argsort(apart[at])[:MOST]]]
+        return found
+
+    found = alike(NEARLY if idles else CLOSES * usual, LIVELY)
+    if not found:
+        idles, found = True, alike(NEARLY, 0.0)
     chosen: list[tuple[int, int, float]] = []
     for apart_by, start, stop in sorted(found, key=lambda one: (one[1] - one[2], one) if idles else one):
         if len(chosen) == MOST:

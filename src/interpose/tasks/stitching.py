@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, feet, on_rig_of, seams
@@ -24,6 +26,10 @@ TRIED, BRIEFEST, BESIDE, TRAVELS, GLIDING = 1.0, 0.3, 0.7, 0.2, 50.0
 # Seconds that are generated of a motion that goes round already, and more of them where something would be
 # flagged: a foot that is elsewhere can step.
 BRIDGES = (0.15, 0.3, 0.5)
+# Its joints jump no further there than so many times what each does at most in the clip, or than this (metres
+# a second squared): poses that are alike in the mean may have a hand elsewhere, and limits of seams are those
+# of a body's liveliest joints.
+SNAPS, CALM = 1.3, 8.0
 
 
 @dataclass(frozen=True)
@@ -122,8 +128,8 @@ class Cycle:
 def cycle(clip: Clip) -> Cycle:
     """The part of a motion that loops best: of a walk one stride or several, of a dance a figure.
 
-    The one whose ends are most alike, of those that close without anything that would be flagged, the sooner
-    the better; where none does, the one in which least is, and feet slide least.
+    The one whose ends are most alike, of those that close without anything that would be flagged, nor a snap,
+    the sooner the better; where none does, the one in which least is, and joints snap and feet slide least.
 
     Raises:
         RequestError: no humanoid, or nothing in it comes back.
@@ -136,23 +142,35 @@ def cycle(clip: Clip) -> Cycle:
             "no pose of it is like one that was there half a second to eight seconds before",
             "Loop all of it (without --trim, or cycle): then a way back to the beginning is generated.",
         )
-    judged: dict[Cycle, tuple[int, float]] = {}
+    judged: dict[Cycle, tuple[int, float, float]] = {}
+    own = list(body.mapping.mapped[1])  # a root that stays at the origin is put elsewhere each time
+    most = np.maximum(acceleration(clip.positions()).max(axis=0, initial=0.0), CALM / clip.fps**2)[own]
     for seconds in BRIDGES:
         for begin, end, apart in found:
             bridge = min(max(2, round(seconds * clip.fps)), end - begin - 2)
             one = Cycle(begin, end - bridge, bridge, apart)
-            (closed,) = stitch([clip.slice(one.start, one.stop)], one.frames, loop=True).report.gaps
-            flags, slides = _judged(closed)
-            # Feet are not where the last frame has them, so that also the briefest way back may skid.
             kept = clip.slice(one.start, one.stop)
-            own = feet.measure(kept, Observation.full(kept), 1, len(kept) - 1)
+            done = stitch([kept], one.frames, loop=True)
+            (closed,) = done.report.gaps
+            flags, slides = _judged(closed)
+            snaps = float((_jumps(done, len(kept))[own] / most).max())
+            # Feet are not where the last frame has them, so that also the briefest way back may skid.
+            usual = feet.measure(kept, Observation.full(kept), 1, len(kept) - 1)
             skids = closed.foot_slide is not None and skidding(
-                closed.foot_slide, own and own[0], clip.skeleton
+                closed.foot_slide, usual and usual[0], clip.skeleton
             )
-            judged[one] = flags + skids, slides
+            judged[one] = flags + skids + (snaps > SNAPS), max(snaps, SNAPS), slides
             if not judged[one][0]:
                 return one
     return min(judged, key=lambda one: judged[one])
+
+
+def _jumps(done: Stitched, start: int) -> np.ndarray:
+    """(J,) how far joints of a loop jump at most from where the way back begins until it goes round again, in
+    metres per frame squared."""
+    assert done.loop is not None
+    back, again = done.clip.slice(start - 2, len(done.clip)), done.loop.placement.of(done.clip.slice(0, 2))
+    return acceleration(np.concatenate([back.positions(), again.positions()])).max(axis=0)
 
 
 def _tried(
