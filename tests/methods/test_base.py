@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+import interpose
 from interpose.geometry import rotations
 from interpose.methods import base
 from interpose.methods.weights import find
@@ -82,3 +85,36 @@ def test_what_it_is_sure_of_is_said_at_once_whatever_joints_there_are(monkeypatc
         turned, np.where((np.arange(100) >= 20) & (np.arange(100) < 80), 0.1, 0.0), atol=1e-6
     )
     assert (done.expected[hole] >= expected).all()
+
+
+def test_who_goes_on_does_so_at_the_pace_at_which_he_came():
+    """Of what is said too fast fewer frames are shown, each for longer."""
+    n = 60
+    there = np.zeros((n, 3))
+    there[:, 2] = 0.02 * np.arange(n)
+    assert base.steady_pace(there) == pytest.approx(0.02)
+    assert base.steady_pace(there[:40]) is None  # two seconds tell
+    assert base.steady_pace(np.tile(there[:1], (n, 1))) is None  # who stands may set off
+    starts = there.copy()
+    starts[:40, 2] = starts[39, 2]
+    assert base.steady_pace(starts) is None
+    said = answer("Head", np.zeros(FRAMES))
+    said.root[:, 2] = there[-1, 2] + 0.04 * np.arange(-9, FRAMES - 9)
+    own = slice(10, 20)
+    slow = base.at_pace(said, own, there[-15:], 0.02, False)
+    assert np.diff(slow.root[9:20, 2]).max() < 0.031
+    assert np.diff(slow.root[9:20, 2]).min() > 0.02
+    assert base.at_pace(said, own, there[-15:], 0.05, False) is said
+    back = base.at_pace(said.backwards(), slice(20, 30), there[-15:], 0.02, True)
+    assert np.allclose(back.root[20:30], slow.root[10:20][::-1])
+
+
+def test_forecasts_of_who_shuffles_do_not_run(cmu_walk):
+    """At 40 % of its pace a stride takes longer than any that is carried on."""
+    clip = cmu_walk.slice(1, 209)
+    slow = interpose.resample(clip, 75.0, smooth=True)
+    slow = replace(slow, fps=30.0, source=None)
+    done = interpose.forecast(slow.slice(0, 190), frames=120, method="small").clip
+    pace = np.linalg.norm(np.diff(done.root[:, [0, 2]], axis=0), axis=1)
+    own = max(pace[at : at + 15].mean() for at in range(130, 175))
+    assert max(pace[at : at + 15].mean() for at in range(190, 295)) < 1.3 * own

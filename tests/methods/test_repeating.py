@@ -91,7 +91,7 @@ def test_a_rhythm_that_quickens_fits_both_sides():
     assert rhythm.inside == pytest.approx(32.5, abs=0.7)
     said = frozen(truth)
     done, periods = repeating.carried_on(truth, known(), said, BONES)
-    assert periods == {HOLE: pytest.approx(rhythm.inside, abs=0.5)}
+    assert periods == {HOLE: ("what repeats itself", pytest.approx(rhythm.inside, abs=0.5))}
     assert off(done, truth, "Arm") < 0.3 * off(said, truth, "Arm")
 
 
@@ -202,7 +202,7 @@ def test_the_body_tells_how_long_a_repetition_takes():
     arm = JOINTS.index("RightArm")
     truth.local[:, arm] = quick.local[:, arm]
     _, periods = repeating.carried_on(truth, known(), frozen(truth), BONES)
-    assert periods == {HOLE: pytest.approx(31, abs=0.5)}
+    assert periods == {HOLE: ("what repeats itself", pytest.approx(31, abs=0.5))}
 
 
 def test_what_comes_before_a_clip_is_what_goes_on_backwards():

@@ -220,20 +220,20 @@ def _bends(clip: Clip) -> list[Bend]:
         for start, stop in runs(bends < 0):
             part = bends[start:stop]
             far = int((part < -BACKWARDS).sum())
-            possible = part.min() > -FURTHEST or _turns_over(bends, start, stop)
+            possible = part.min() > -FURTHEST or _turns_over(local[:, row], start, stop)
             if far > max(1, LASTING * clip.fps) and possible:
                 wrong += far
                 found.append(Bend(start, stop, shin, body))
     return found if right > SOME * wrong and len({one.shin for one in found}) < 2 else []
 
 
-def _turns_over(bends: np.ndarray, start: int, stop: int) -> bool:
-    """Whether a knee that `bends` (F,), in radians, jumps the other way at both ends of the frames start to
-    stop - 1, and would not if it were turned back."""
-    if start == 0 or stop == len(bends):
+def _turns_over(local: np.ndarray, start: int, stop: int) -> bool:
+    """Whether a knee with rotations (F, 4) jumps at both ends of the frames start to stop - 1, and would not
+    if it were bent back."""
+    if start == 0 or stop == len(local):
         return False
-    inside, beside = bends[[start, stop - 1]], bends[[start - 1, stop]]
-    jumps, rest = (np.abs(np.angle(np.exp(1j * (some - beside)))) for some in (inside, -inside))
+    inside, beside = local[[start, stop - 1]], local[[start - 1, stop]]
+    jumps, rest = (rotations.angle(some, beside) for some in (inside, rotations.conjugate(inside)))
     return bool((jumps > BACKWARDS).all() and (rest < Flip.sure * jumps).all())
 
 
