@@ -12,12 +12,12 @@ from interpose import tasks
 from interpose.errors import RequestError
 from interpose.finish import Provenance, anatomy, feet, pins, seams
 from interpose.formats import load, save
-from interpose.geometry import rotations
+from interpose.geometry import kinematics, rotations
 from interpose.methods.base import pinned
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Pin
-from interpose.skeletons import JOINTS, find_humanoid, find_mapping
+from interpose.skeletons import JOINTS, PARENTS, find_humanoid, find_mapping
 from interpose.skeletons.humanoid import reflect
 
 GAP = Gap(70, 100)
@@ -170,6 +170,45 @@ def test_an_orientation_is_met_with_a_place(cmu_walk):
     hand = done.skeleton.index("LeftHand")
     assert rotations.angle(globals_[85, hand], turned[0]) < 1e-3
     np.testing.assert_allclose(placed[85, hand], pin.position[0], atol=1e-3)
+
+
+@pytest.mark.parametrize("degrees", [90.0, 170.0])
+def test_a_forearm_takes_its_share_of_how_a_hand_turns_about_it(cmu_walk, degrees):
+    """A wrist alone would twist as no wrist does; hand and elbow stay where they are."""
+    hand, forearm = (cmu_walk.skeleton.index(name) for name in ("LeftHand", "LeftForeArm"))
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    turned, placed = (values[85] for values in free.kinematics())
+    bone = placed[hand] - placed[forearm]
+    about = rotations.exp(np.radians(degrees) * bone / np.linalg.norm(bone))
+    pin = Pin("LeftHand", [85], orientation=rotations.multiply(about, turned[hand])[None])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip
+    there, where = (values[85] for values in done.kinematics())
+    assert rotations.angle(there[hand], pin.orientation[0]) < 1e-3
+    np.testing.assert_allclose(where[[hand, forearm]], placed[[hand, forearm]], atol=1e-6)
+    shares = [
+        np.degrees(rotations.angle(done.rotation[85, j], free.rotation[85, j])) for j in (hand, forearm)
+    ]
+    assert shares == pytest.approx([degrees / 2, degrees / 2], abs=1.0)
+
+
+@pytest.mark.parametrize("height", [0.45, 0.2])
+def test_who_reaches_down_bends_as_people_do(cmu_walk, height):
+    """In hips and knees: a spine that folds up leaves them where they were."""
+    body, hand = find_humanoid(cmu_walk), cmu_walk.skeleton.index("RightHand")
+    free = tasks.fill(cmu_walk, [GAP], "small").clip
+    place = free.positions()[90, hand]
+    place[1] = height
+    pin = Pin("RightHand", np.arange(88, 93), np.tile(place, (5, 1)))
+    done = tasks.fill(cmu_walk, [GAP], "small", pins=[pin]).clip
+    np.testing.assert_allclose(done.positions()[90, hand], place, atol=1e-3)
+    neck = JOINTS.index("Neck")
+    long, short = (
+        np.linalg.norm(placed[90, neck] - placed[90, 0]) for placed in map(body.positions, (free, done))
+    )
+    assert short > 0.85 * long
+    local = kinematics.local_rotations(body.rotations(done), PARENTS)[90]
+    trunk = [JOINTS.index(name) for name in ("Spine", "Spine1", "Spine2", "Neck")]
+    assert np.degrees(rotations.angle(local[trunk], rotations.identity())).max() < 45
 
 
 def test_the_result_follows_when_the_room_is_turned(cmu_walk):

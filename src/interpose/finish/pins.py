@@ -32,6 +32,8 @@ SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
 HINGED = 0.3
 # Radians by which a joint that is known to be turned is turned otherwise than a pin says.
 TURNED = 0.01
+# Of how a pinned hand turns about its forearm, the share that the forearm does.
+FOREARM = 0.5
 # Seconds over which a joint slows down to a place that it is to hold while the body goes on.
 LEAD = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
@@ -392,12 +394,32 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     off = _unrolled(
         rotations.log(rotations.multiply(pin.orientation, rotations.conjugate(turned[pin.frames, joint])))
     )
-    change = rotations.exp(_between(len(clip), np.asarray(pin.frames), off, edges, clip.fps))
-    done, parent = rotations.multiply(change, turned[:, joint]), clip.skeleton.parents[joint]
+    change = _between(len(clip), np.asarray(pin.frames), off, edges, clip.fps)
+    free = ~known.rotation[:, joint, None]
+    clip = _forearm_turned(clip, known, joint, np.where(free, change, 0.0))
+    done, parent = rotations.multiply(rotations.exp(change), turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
-        done = rotations.relative(turned[:, parent], done)
+        done = rotations.relative(clip.kinematics()[0][:, parent], done)
     rotation = clip.rotation.copy()
-    rotation[:, joint] = np.where(known.rotation[:, joint, None], rotation[:, joint], done)
+    rotation[:, joint] = np.where(free, done, rotation[:, joint])
+    return clip.with_motion(rotation, clip.translation)
+
+
+def _forearm_turned(clip: Clip, known: Observation, joint: int, change: np.ndarray) -> Clip:
+    """The clip with a forearm, where it is free, turned about itself by its share of how its hand is to turn,
+    rotation vectors (F, 3): a wrist alone would twist further than any. The hand stays where it is."""
+    skeleton, mapping = clip.skeleton, find_mapping(clip.skeleton)
+    forearm = skeleton.parents[joint]
+    arms = [(mapping[side + "Hand"], mapping[side + "ForeArm"]) for side in ("Left", "Right")]
+    if (joint, forearm) not in arms or forearm < 0:
+        return clip
+    turned, placed = clip.kinematics()
+    bone = placed[:, joint] - placed[:, forearm]
+    bone = bone / np.maximum(np.linalg.norm(bone, axis=1, keepdims=True), 1e-9)
+    about = FOREARM * (change * bone).sum(axis=1, keepdims=True) * bone
+    rotation, above = clip.rotation.copy(), turned[:, skeleton.parents[forearm]]
+    shared = rotations.relative(above, rotations.multiply(rotations.exp(about), turned[:, forearm]))
+    rotation[:, forearm] = np.where(known.rotation[:, forearm, None], rotation[:, forearm], shared)
     return clip.with_motion(rotation, clip.translation)
 
 
