@@ -7,7 +7,7 @@ import pytest
 
 import interpose
 from interpose.finish import Provenance
-from interpose.finish.path import follow
+from interpose.finish.path import FASTEST, _no_faster, follow
 from interpose.geometry import measures, rotations
 
 GAP, MIDDLE = (140, 190), 165
@@ -133,3 +133,16 @@ def test_points_along_a_smooth_way_are_led_over_smoothly(cmu_walk):
     points = cmu_walk.root[frames][:, [0, 2]] + wave[:, None]
     led = follow(cmu_walk, *GAP, {int(frames[k]): points[k] for k in range(9, len(frames) - 5, 10)})
     assert np.linalg.norm(led.root[frames][:, [0, 2]] - points, axis=1).max() < 0.01
+
+
+def test_a_turn_that_is_too_fast_is_slowed_where_it_is():
+    """Not all along: who winds his way turns along the rest of it as he did."""
+    time = np.linspace(0, 4, 121)
+    turned = 0.8 * np.sin(1.5 * np.pi * time / 2)
+    steep = turned + 1.5 * (np.clip(time - 2.0, 0, 0.1) / 0.1 - np.clip(time - 3.0, 0, 0.9) / 0.9)
+    step = FASTEST / 30
+    calm = _no_faster(steep, step)
+    assert np.abs(np.diff(steep)).max() > 2 * step
+    assert np.abs(np.diff(calm)).max() < step + 1e-9
+    np.testing.assert_allclose(calm[:45], steep[:45], atol=1e-9)
+    np.testing.assert_allclose(_no_faster(turned, step), turned, atol=1e-9)

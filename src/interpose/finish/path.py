@@ -26,7 +26,7 @@ BEYOND = 1.2  # times as far aside as any point says: a spline that swings out f
 SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
 FLOOR = np.array([1.0, 0.0, 1.0])
 EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
-FASTEST = np.radians(200)  # a second by which the body is turned besides its own turns: else it turns less
+FASTEST = np.radians(200)  # a second by which the body is turned besides its own turns at most
 
 
 def spans(clip: Clip, known: Observation, path: Iterable[int]) -> list[tuple[int, int]]:
@@ -107,8 +107,16 @@ def _turns(old: np.ndarray, new: np.ndarray, near: np.ndarray, fps: float) -> np
     turned = np.unwrap(np.angle(_smooth(change, fps)))
     # No whole turns, and no faster than people turn.
     turned = ramp(near / EASE) * (turned - 2 * np.pi * np.round(np.median(turned) / (2 * np.pi)))
-    fastest = np.abs(np.diff(turned)).max(initial=0.0) * fps
-    return np.asarray(turned * min(1.0, FASTEST / fastest) if fastest else turned)
+    return _no_faster(turned, FASTEST / fps)
+
+
+def _no_faster(values: np.ndarray, step: float) -> np.ndarray:
+    """Values (n,), 0 at both ends, that change by no more than a step from each to the next: midway between
+    the lowest such ones that are nowhere below these and the highest nowhere above. What is as slow stays."""
+    at = np.arange(len(values))
+    way = step * np.abs(np.subtract.outer(at, at))
+    most = np.minimum(way[0], way[-1])
+    return np.clip(((values + way).min(axis=1) + (values - way).max(axis=1)) / 2, -most, most)
 
 
 def _smooth(values: np.ndarray, fps: float) -> np.ndarray:
