@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from interpose.formats import load, save
+from interpose.geometry import rotations
+from interpose.observation.finding import Finding
 
 
 @pytest.mark.parametrize(
@@ -58,3 +60,19 @@ def test_what_interpose_filled_is_not_called_splined(run, take, monkeypatch):
         assert (done.code, done.json["filled"]) == (0, ["60:90"])
     take.with_name("take.filled.json").write_text("{")
     assert "splined" in run("scan", "take.filled.bvh").out
+
+
+def test_what_is_stuck_once_the_rest_moves_is_told_of(run, take, monkeypatch):
+    """Else `fill` would send whoever comes from `recover` back to it."""
+    from interpose.observation import scan as module
+
+    clip = load(take)
+    rotation, arm = clip.rotation.copy(), clip.skeleton.index("LeftArm")
+    rotation[60:64, arm] = rotations.multiply(rotation[60:64, arm], rotations.about("X", np.array(1.5)))
+    save(clip.with_motion(rotation, clip.translation), take.with_name("odd.bvh"))
+    stuck = Finding("frozen body", ("Hips", "Spine"), 20, 31)
+    monkeypatch.setattr(module, "scan", lambda clip: [stuck])
+    done = run("recover", "odd.bvh")
+    assert done.code == 4
+    assert "Stuck, now that the rest moves: Hips, Spine 20:31" in done.out
+    assert "interpose recover odd.recovered.bvh, once more" in done.out

@@ -72,7 +72,7 @@ def recover(
     from interpose.cli.request import check_method, range_of
     from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
-    from interpose.observation.finding import NO_GAPS
+    from interpose.observation.finding import NO_GAPS, STUCK
     from interpose.observation.scan import OR, scan, stays
 
     check_method(method, license)
@@ -91,6 +91,8 @@ def recover(
     looked = chosen is None and not place
     seen = scan(done.clip) if looked else []
     others = [one for one in seen if one.kind not in NO_GAPS]
+    # Once joints move again that were stuck with all of a pose, the rest of it is a body that is stuck.
+    again = [f"{names(one.joints)} {one.start}:{one.stop}" for one in seen if one.kind in STUCK]
     sides = ""
     if either := [one for one in seen if OR in one.note]:
         part = f"{either[0].start}:{either[0].stop}"
@@ -109,7 +111,9 @@ def recover(
         )
     lost = [f"{names(one.joints)} {one.start}:{one.stop}" for one in others]
     more: dict[str, Any] = {"dry_run": True} if dry_run else {}
-    more |= {"left": f"{', '.join(lost)}, which `interpose fill` fills"} if others else {}
+    left = [f"{', '.join(lost)}, which `interpose fill` fills"] if others else []
+    left += [f"{', '.join(again)}, which `interpose recover` restores, once more"] if again else []
+    more |= {"left": "; ".join(left)} if left else {}
     if stood := [f"{one.start}:{one.stop}" for one in done.report.gaps if STOOD in one.notes]:
         more["place"] = ", ".join(stood)
     code = finish(
@@ -117,9 +121,12 @@ def recover(
     )
     if sides and not json:
         say(sides)
+    next_ = quote(str(file if dry_run else outputs.clip))
+    if again and not json:
+        say(f"Stuck, now that the rest moves: {', '.join(again[:SHOWN])}")
+        say(f"interpose recover {next_}, once more, restores it.")
     if others and not json:
         rest = f" and {len(others) - SHOWN} more" if len(others) > SHOWN else ""
         say(f"Missing, too, and left as it is: {', '.join(lost[:SHOWN])}{rest}")
-        next_ = quote(str(file if dry_run else outputs.clip))
         say(f"interpose fill {next_} fills it; interpose scan lists all.")
-    return code or (4 if others else 0)
+    return code or (4 if left else 0)
