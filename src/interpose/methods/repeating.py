@@ -21,8 +21,9 @@ from interpose.skeletons import JOINTS, PARENTS
 # more (who waves has raised his arm before); and what a repetition takes, at least and at most. So many times
 # as much is to be known of it.
 LOOKS, SHORTEST, LONGEST, TIMES = (120, 75, 50), 8, 50, 1.4
-# Where nothing follows, or goes before, slow strides count, too: of 30 walks, most of them of people who are
-# old, sad or proud, 23 are carried on so instead of 20, and three seconds are off by 17.5 cm, not 18.9.
+# Where nothing follows, or goes before, for longer than ALONE, slow strides count, too: of 30 walks, many of
+# them of people who are old, sad or proud, 23 are carried on so instead of 19, and three seconds of them are
+# off by 17.5 cm and not by 18.6.
 LONGEST_ALONE, TIMES_ALONE = 70, 1.2
 # By what share periods may differ from side to side, and from the one in the hole that fits both.
 UNEVEN, STRETCHED = 0.2, 0.15
@@ -242,7 +243,9 @@ def find(before: np.ndarray, after: np.ndarray | None, length: int, alike: float
         found = find(after[::-1], before[::-1], length, alike)
         return found and Rhythm(found.after or 0.0, found.before, found.inside)
     if after is None:
-        alone = _nearby(before[::-1], alike, LONGEST_ALONE, TIMES_ALONE)
+        # The further it goes the less the network knows; before, what comes back once may do so by chance.
+        times = TIMES_ALONE if length > ALONE else TIMES
+        alone = _nearby(before[::-1], alike, LONGEST_ALONE, times)
         return None if alone is None else Rhythm(alone, None, alone)
     first, last = (_nearby(poses, alike, LONGEST, TIMES) for poses in (before[::-1], after))
     if first is None:
