@@ -11,7 +11,7 @@ from tests.skeletons import rigs
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import FileError, RequestError
-from interpose.skeletons import JOINTS, find_mapping
+from interpose.skeletons import JOINTS, find_mapping, names
 from interpose.skeletons.mapfile import map_text, read_map
 
 
@@ -274,3 +274,84 @@ def test_anything_may_be_called_anything(cmu_walk):
         find_mapping(replace(cmu_walk.skeleton, names=names))
     lone = Clip(Skeleton(("x",), (-1,), np.zeros((1, 3))), np.ones((1, 1, 4)) / 2, np.zeros((1, 1, 3)), 30.0)
     assert not find_mapping(lone.skeleton).usable
+
+
+def beside(skeleton: Skeleton, helpers: dict[str, str]) -> Skeleton:
+    """The skeleton with a leaf before each of some joints, where that begins, by the joints' names."""
+    names, parents, rest, at = [], [], [], {}
+    for joint, name in enumerate(skeleton.names):
+        above = skeleton.parents[joint]
+        for helper in (key for key, like in helpers.items() if like == name):
+            names.append(helper)
+            parents.append(at[above])
+            rest.append(skeleton.rest_translation[joint])
+        at[joint] = len(names)
+        names.append(name)
+        parents.append(at[above] if above >= 0 else -1)
+        rest.append(skeleton.rest_translation[joint])
+    return Skeleton(names, parents, np.array(rest))
+
+
+def test_helpers_that_are_called_like_what_they_help_are_none_of_it(cmu_walk):
+    """Leaves that come first in the file: of elbow, ankle, collar and thigh."""
+    plain = cmu_walk.skeleton
+    leaves = {
+        "LeftElbow": "LeftForeArm",
+        "LeftAnkle": "LeftFoot",
+        "LeftCollar": "LeftShoulder",
+        "RightThigh": "RightUpLeg",
+    }
+    expected = named(plain)
+    found = named(beside(plain, leaves))
+    assert found == expected
+
+
+@pytest.mark.parametrize("prefix", ["Body_", "Head_", "R_", "FullBody_", "man_l_", "mixamorig:"])
+@pytest.mark.parametrize("heap", [False, True])
+def test_a_prefix_may_be_a_part_or_a_side(cmu_walk, prefix, heap):
+    plain = cmu_walk.skeleton
+    rest = (
+        plain.rest_translation * [1.0, 1.0, 0.0] if not heap else np.abs(plain.rest_translation) * [0, 1, 0]
+    )
+    skeleton = replace(plain, names=tuple(prefix + name for name in plain.names), rest_translation=rest)
+    joints = find_mapping(skeleton).joints
+    assert joints == find_mapping(replace(plain, rest_translation=rest)).joints
+    assert find_mapping(skeleton).surely in ("name", "chain")
+
+
+@pytest.mark.parametrize(
+    ("own", "role"),
+    [
+        ("SKEL_L_Thigh", "LeftUpLeg"),
+        ("thigh_stretch.l", "LeftUpLeg"),
+        ("NPC L Thigh [LThg]", "LeftUpLeg"),
+        ("LLegThigh", "LeftUpLeg"),
+        ("leg left knee", "LeftLeg"),
+    ],
+)
+def test_words_of_tools_say_nothing_of_the_body(own, role):
+    (said,) = names.read((own,))
+    part = {"LeftUpLeg": "thigh", "LeftLeg": "shin"}[role]
+    assert (said.part, said.side) == (part, -1)
+
+
+def test_by_shape_names_tell_the_sides_and_both_limbs_are_cut_alike(cmu_walk):
+    """Of joints whose other words say nothing, on a rig whose bones differ a little from side to side, and on
+    which something stands out behind each ankle."""
+    clip, _ = rigs.build("unity", cmu_walk)
+    old = clip.skeleton
+    expected = find_mapping(old)
+    told = {}
+    for joint, name in enumerate(old.names):
+        side = "L" if "Left" in name else "R" if "Right" in name else "C"
+        told[joint] = f"{side}_q{joint}"
+    rest = old.rest_translation.copy()
+    for joint, name in enumerate(old.names):
+        if "Left" in name:
+            rest[joint] *= 1.03
+    toes = [expected.joints[JOINTS.index(side + "Toe")] for side in ("Left", "Right")]
+    rest[[toe for toe in toes if toe is not None]] *= [1.0, 1.0, -1.0]
+    mapping = find_mapping(Skeleton(tuple(told.values()), old.parents, rest))
+    for side in ("Left", "Right"):
+        for part in ("UpLeg", "Leg", "Foot", "Arm", "ForeArm", "Hand"):
+            assert mapping[side + part] == expected[side + part], side + part

@@ -130,12 +130,16 @@ def straightened(opinion: Clip, known: Observation) -> Clip:
 def still(clip: Clip, known: Observation) -> np.ndarray:
     """(J,) True for joints that never turn where they are seen, for a second or longer, while others do.
 
-    Toes of some rigs have never been captured, nor what stands between hips and thighs.
+    Toes of some rigs have never been captured, nor what stands between hips and thighs. Hips that a root
+    turns do turn, though never against it.
     """
     still = np.zeros(len(clip.skeleton), bool)
     for joint in np.flatnonzero(known.rotation.sum(axis=0) >= clip.fps):
         seen = clip.rotation[known.rotation[:, joint], joint]
         still[joint] = (np.abs(rotations.alike(seen, seen[:1]) - seen[0]) < LOCKED).all()
+    line = [hips_of(clip.skeleton), *clip.skeleton.ancestors(hips_of(clip.skeleton))]
+    if not still[line].all():
+        still[line] = False
     return still if still.mean() <= MOVING else np.zeros_like(still)
 
 

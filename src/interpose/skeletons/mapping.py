@@ -213,7 +213,7 @@ def _find(skeleton: Skeleton, inside: list[int], given: dict[str, int | None]) -
     chains = _Chains(skeleton, said)
     found, how = chains.limbs()
     if not {"LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm"} <= set(found) and (
-        shaped := guess(skeleton, inside)
+        shaped := guess(skeleton, inside, {joint: one.side for joint, one in said.items()})
     ):
         found, how = shaped, dict.fromkeys(shaped, "shape")
     fixed = {name: joint for name, joint in here.items() if joint is not None}
@@ -266,6 +266,7 @@ class _Chains:
     def __init__(self, skeleton: Skeleton, said: dict[int, names.Said]) -> None:
         self.skeleton, self.said = skeleton, said
         self.above = {joint: skeleton.ancestors(joint) for joint in said}
+        self.inner = {joint for above in self.above.values() for joint in above}
 
     def limbs(self) -> tuple[Found, dict[str, str]]:
         """Legs and arms by their names; what one side's names leave open follows from the other side, or from
@@ -319,12 +320,16 @@ class _Chains:
         return found
 
     def _first(self, parts: str, side: int, below: int | None = None) -> int | None:
-        """The topmost joint that is one of these parts of a side, below a joint."""
-        for joint, said in self.said.items():
-            under = below is None or below in self.above[joint]
-            if said.side == side and said.part in parts.split() and under:
-                return joint
-        return None
+        """The topmost joint that is one of these parts of a side, below a joint; one from which something
+        hangs before one from which nothing does, as helpers are called like what they help."""
+        found = [
+            joint
+            for joint, said in self.said.items()
+            if said.side == side and said.part in parts.split()
+            if below is None or below in self.above[joint]
+        ]
+        top = [joint for joint in found if not {*found} & {*self.above[joint]}]
+        return max(top, key=self.inner.__contains__, default=None)
 
     def _leg(self, side: int) -> Found:
         # A "hip" of one side is the thigh where nothing else is called so; the last, after a "hip joint".
@@ -340,6 +345,7 @@ class _Chains:
 
     def _arm(self, side: int) -> Found:
         clavicle, shoulder = self._first("clavicle", side), self._first("shoulder", side)
+        clavicle = clavicle if clavicle in self.inner else None
         arm = self._first("upperarm", side, clavicle if clavicle is not None else shoulder)
         if arm is None:
             # "Shoulder" is the collar bone where something below is called arm, and else the upper arm.

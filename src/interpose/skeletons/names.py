@@ -50,7 +50,7 @@ LEFT, RIGHT = {"left", "l", "lft", "lt"}, {"right", "r", "rgt", "rt"}
 # Words that say nothing about the body, and words of joints that hang from others and are none of the 22.
 _TOOLS = (
     "mixamorig bip biped cc base def org j c m jnt joint bone jt skeleton character armature rig sk b bind "
-    "skin"
+    "skin skel stretch npc"
 )
 _EXTRAS = (
     "twist roll ik end nub tip effector helper pole target ctrl fk sec adj eye jaw tongue brow lip cheek "
@@ -71,8 +71,8 @@ class Said:
 
 
 def words(name: str) -> list[str]:
-    """The words of a name, in lower case, without its namespace."""
-    return [word.lower() for word in CUT.findall(re.split(r"[:|]", name)[-1])]
+    """The words of a name, in lower case, without its namespace and what stands in brackets."""
+    return [word.lower() for word in CUT.findall(re.sub(r"\[.*?\]", "", re.split(r"[:|]", name)[-1]))]
 
 
 def _shared(named: list[list[str]]) -> list[str]:
@@ -82,11 +82,7 @@ def _shared(named: list[list[str]]) -> list[str]:
         count = len(shared)
         firsts = [one[count] for one in named if len(one) > count + 1 and one[:count] == shared]
         common = max(set(firsts), key=firsts.count, default="")
-        if (
-            len(firsts) < 3
-            or firsts.count(common) < 0.8 * len(named)
-            or common in MEANING | dict.fromkeys(LEFT | RIGHT)
-        ):
+        if len(firsts) < 3 or firsts.count(common) < 0.8 * len(named):
             return shared
         shared.append(common)
 
@@ -94,8 +90,13 @@ def _shared(named: list[list[str]]) -> list[str]:
 def read(names: tuple[str, ...]) -> list[Said]:
     """What the names of a skeleton's joints say."""
     cut = [words(name) for name in names]
-    prefix = _shared(cut)
-    return [_say(one[len(prefix) :] if one[: len(prefix)] == prefix else one) for one in cut]
+    shared = _shared(cut)
+    readings = []
+    for count in range(len(shared) + 1):
+        prefix = shared[:count]
+        readings.append([_say(one[count:] if one[:count] == prefix else one) for one in cut])
+    # A prefix may be a word for a part or a side: what leaves most of a body is none of it.
+    return max(readings, key=lambda said: len({(one.part, one.side) for one in said}))
 
 
 def _say(cut: list[str]) -> Said:
@@ -106,6 +107,8 @@ def _say(cut: list[str]) -> Said:
             side = -1 if word in LEFT else 1
         elif not word.isdigit() and word not in TOOLS:
             kept.append(word)
+    if len(kept) == 2 and kept[0] in ("arm", "leg") and kept[1] in MEANING and "".join(kept) not in MEANING:
+        kept = kept[1:]  # LLegThigh
     plain = "".join(kept)
     extra = EXTRAS & set(kept)
     if not side and plain not in MEANING:

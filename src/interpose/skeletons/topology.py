@@ -72,7 +72,11 @@ class _Shape:
         if best is None or (same := int(self._alike(*best)[0])) < 2:
             return []
         # As far as they are alike: what a hand holds does not count.
-        return [self._limb(chain[: same + 1]) for chain in best]
+        one, other = (chain[: same + 1] for chain in best)
+        # The last that are nearly the longest: some collar bones are as long as forearms.
+        sums = sum(self.length[chain[1:-1]] + self.length[chain[2:]] for chain in (one, other))
+        at = int(np.flatnonzero(sums >= 0.9 * np.max(sums))[-1])
+        return [_Limb(one, at), _Limb(other, at)]
 
     def _alike(self, a: list[int], b: list[int]) -> tuple[float, float]:
         """How many bones two chains have in common from their start on, and how alike these are."""
@@ -80,14 +84,12 @@ class _Shape:
         same = next((i for i, one in enumerate(off) if one > LIKE), len(off))
         return same, -float(np.sum(off[:same]))
 
-    def _limb(self, chain: list[int]) -> _Limb:
-        sums = np.array([self.length[b] + self.length[c] for b, c in zip(chain[1:], chain[2:])])
-        # The last that are nearly the longest: some collar bones are as long as forearms.
-        return _Limb(chain, int(np.flatnonzero(sums >= 0.9 * sums.max())[-1]))
 
+def guess(skeleton: Skeleton, inside: list[int], sides: dict[int, int]) -> dict[str, int]:
+    """Canonical joints to the skeleton's own, of those `inside`; nothing when the shape is no humanoid's.
 
-def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
-    """Canonical joints to the skeleton's own, of those `inside`; nothing when the shape is no humanoid's."""
+    sides: what their names say, -1 left, 1 right and 0 neither.
+    """
     shape = _Shape(skeleton, inside)
     for hips in inside:
         legs = shape.pair(hips)
@@ -103,14 +105,16 @@ def guess(skeleton: Skeleton, inside: list[int]) -> dict[str, int]:
             if np.linalg.norm(up) > 1e-6 and up @ down < -0.5 * np.linalg.norm(up) * np.linalg.norm(down):
                 return {
                     "Hips": carrier,
-                    **_limbs(shape, legs, shape.pair(chest), up),
+                    **_limbs(shape, legs, shape.pair(chest), up, sides),
                     **_head(shape, chest, up, legs),
                 }
     return {}
 
 
-def _limbs(shape: _Shape, legs: list[_Limb], arms: list[_Limb], up: np.ndarray) -> dict[str, int]:
-    """Legs and arms by name; feet point ahead, and so tell left from right."""
+def _limbs(
+    shape: _Shape, legs: list[_Limb], arms: list[_Limb], up: np.ndarray, sides: dict[int, int]
+) -> dict[str, int]:
+    """Legs and arms by name; feet point ahead, and so tell left from right where names do not."""
     feet = [
         shape.placed[leg.chain[leg.at + 3]] - shape.placed[leg.end]
         for leg in legs
@@ -121,16 +125,15 @@ def _limbs(shape: _Shape, legs: list[_Limb], arms: list[_Limb], up: np.ndarray) 
     found: dict[str, int] = {}
     for limbs, parts in ((legs, ("UpLeg", "Leg", "Foot", "Toe")), (arms, ("Arm", "ForeArm", "Hand"))):
         apart = shape.placed[limbs[0].middle] - shape.placed[limbs[1].middle]
-        for side, limb in zip(("Left", "Right") if apart @ left > 0 else ("Right", "Left"), limbs):
-            named = dict(zip(parts, limb.chain[limb.at :]))
-            if (
-                "Toe" in named
-                and shape.length[named["Toe"]] < FOOT * shape.length[[limb.middle, limb.end]].sum()
-            ):
-                del named["Toe"]
-            if "Arm" in named and limb.at > 0:
-                named["Shoulder"] = limb.chain[limb.at - 1]
-            found |= {side + part: joint for part, joint in named.items()}
+        named = [sum(sides.get(joint, 0) for joint in limb.chain) for limb in limbs]
+        first = named[0] < 0 if named[0] * named[1] < 0 else apart @ left > 0
+        for side, limb in zip(("Left", "Right") if first else ("Right", "Left"), limbs):
+            own = dict(zip(parts, limb.chain[limb.at :]))
+            if "Toe" in own and shape.length[own["Toe"]] < FOOT * shape.length[[limb.middle, limb.end]].sum():
+                del own["Toe"]
+            if "Arm" in own and limb.at > 0:
+                own["Shoulder"] = limb.chain[limb.at - 1]
+            found |= {side + part: joint for part, joint in own.items()}
     return found
 
 
