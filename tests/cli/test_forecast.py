@@ -28,10 +28,22 @@ def test_two_seconds_are_added(run, walk):
     assert np.array_equal(made.translation[: len(was)], was.translation)
     report = json.loads(walk.with_name("walk.forecast.json").read_text())
     assert report["verb"] == "forecast"
+    assert report["method"] == "auto"
     assert report["start"] == len(was)
     assert [gap["frames"] for gap in report["gaps"]] == [f"{len(was)}:{len(made)}"]
     assert report["gaps"][0]["seam_after"] <= report["gaps"][0]["seam_limit"]
     assert "<html" in walk.with_name("walk.forecast.html").read_text()
+
+
+def test_a_report_of_samples_says_what_they_were_drawn_with(run, walk):
+    """So that the second can be drawn again."""
+    assert run("forecast", "walk.bvh", "--method", "stmi-gan", "--samples", "2", "--frames", "15").code == 0
+    report = json.loads(walk.with_name("walk.forecast.json").read_text())
+    assert report["units"]["spread"] == "cm"
+    seed = str(report["seed"] + 1)
+    run("forecast", "walk.bvh", "--method", "stmi-gan", "--seed", seed, "--frames", "15", "-o", "again.bvh")
+    second = walk.with_name("walk.forecast.2.bvh").read_bytes()
+    assert walk.with_name("again.bvh").read_bytes() == second
 
 
 def test_as_many_frames_as_asked_for(run, walk):

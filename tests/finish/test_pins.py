@@ -274,6 +274,18 @@ def test_what_a_pin_tears_is_measured_and_said(cmu_walk):
     assert "flagged: the velocity jumps" in " ".join(gap.notes)
 
 
+def test_what_is_torn_at_a_seam_and_inside_is_said_of_both(cmu_walk):
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip.positions()
+    hand = cmu_walk.skeleton.index("LeftHand")
+    pin = Pin("LeftHand", [GAP.start + 1], free[[GAP.start + 1], hand] + [0.5, 0.4, 0.0])
+    (gap,) = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).report.gaps
+    assert gap.seam_after > gap.seam_limit
+    assert gap.peak > gap.peak_limit
+    flags = [note for note in gap.notes if "the velocity jumps" in note]
+    assert ["at a seam" in note for note in flags].count(True) == 1
+    assert ["inside the gap" in note for note in flags].count(True) == 1
+
+
 def test_a_pin_in_the_next_street_is_asked_about(cmu_walk):
     gap = tasks.fill(cmu_walk, [GAP], "spline", pins=[lifted(cmu_walk, up=(0, 0, 30))]).report.gaps[0]
     assert "is the unit right?" in " ".join(gap.notes)

@@ -135,6 +135,10 @@ def test_denoise_puts_them_back_and_says_so(cmu_walk):
     assert off.max() < 0.03
     assert {at for one in done.report.exchanged for at in one.frames} == {"80:104"}
     assert "put back" in str(done.report)
+    # What it says that joints moved is from what came to what comes back.
+    moved = 100 * np.linalg.norm(done.clip.positions() - odd.positions(), axis=-1)[50:150]
+    assert done.report.noise.moved_most == pytest.approx(moved.max(), rel=1e-6)
+    assert done.report.noise.moved == pytest.approx(moved.mean(), rel=1e-6)
     assert tasks.denoise(odd, 0).clip.rotation.tobytes() == odd.rotation.tobytes()
 
 

@@ -78,6 +78,7 @@ def forecast(
     from interpose.cli.request import check_method
     from interpose.formats import save
     from interpose.observation.observation import frames_of
+    from interpose.tasks.forecasting import FIRST
 
     check_method(method, license)
     if samples > MOST:
@@ -93,7 +94,9 @@ def forecast(
     with progress(f"going on with {file.name}", samples * 100) as advance:
         done = tasks.forecast(clip, count, samples, method, seed, temperature, advance)
     more = _more(done, clips, temperature)
-    report = to_json("forecast", file, clips[0], clip, done, seed, {}, more)
+    drawn = FIRST if seed is None and samples > 1 else seed
+    report = to_json("forecast", file, clips[0], clip, done, drawn, {}, more)
+    report["units"] = {**report["units"], "spread": "cm"}
     page = _page(done, outputs.clip.name) if outputs.page else ""
     notes: dict[str, None] = {}
     with beside(outputs, report, page):

@@ -323,7 +323,8 @@ def print_report(completion: Completion, fps: float, why: dict[int, str]) -> Non
 def _legend(gaps: list[GapReport]) -> Iterator[str]:
     """What the columns mean, of those that are there."""
     if any(gap.seam_after is not None for gap in gaps):
-        usual = "" if all(gap.seam_limit is None for gap in gaps) else ": what 95 of 100 of its own are below"
+        known = any(gap.seam_limit is not None and gap.seam_limit != gap.peak_limit for gap in gaps)
+        usual = ": what 95 of 100 of its own are below" if known else ""
         yield f"seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit{usual}"
     yield "bones: largest change of a length, cm"
     if any(gap.foot_slide is not None for gap in gaps):

@@ -234,6 +234,26 @@ def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:
     )
 
 
+def measured(told: NoiseReport, clip: Clip, done: Clip) -> NoiseReport:
+    """The report with how far all of a clip was moved and turned to become another one."""
+    part = slice(told.start, told.stop)
+    before, after = (some.slice(part.start, part.stop) for some in (clip, done))
+    again = _report(
+        before,
+        after,
+        np.zeros(before.rotation.shape[:2], bool),
+        np.zeros(len(clip.skeleton)),
+        told.start,
+        0.0,
+    )
+    moves = ("moved", "moved_most", "turned", "turned_most")
+    joints = tuple(
+        replace(one, **{name: getattr(other, name) for name in moves})
+        for one, other in zip(told.joints, again.joints)
+    )
+    return replace(told, joints=joints, **{name: getattr(again, name) for name in moves})
+
+
 def _report(
     clip: Clip, done: Clip, lost: np.ndarray, noise: np.ndarray, start: int, strength: float
 ) -> NoiseReport:

@@ -284,9 +284,9 @@ class _Work:
                 span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
             if steps := self.stepped.get(chosen):
                 span.notes.append((span.start, span.stop - 1, steps))
-            excess, above, where = jumps.excess(current, known, span, self.bounds, ask.first)
-            if excess > jumps.SLACK:
-                span.notes.append((where, where, f"flagged: {above}"))
+            for excess, above, where in jumps.excesses(current, known, span, self.bounds, ask.first):
+                if excess > jumps.SLACK:
+                    span.notes.append((where, where, f"flagged: {above}"))
         columns = list(clip.translated)
         finished = clip.with_motion(
             np.where(known.rotation[..., None], clip.rotation, current.rotation),

@@ -142,11 +142,18 @@ def peak_limits(hidden: Clip, known: Observation, limits: np.ndarray) -> np.ndar
 def excess(
     current: Clip, known: Observation, span: Span, bounds: Bounds | None, first: int
 ) -> tuple[float, str, int]:
-    """By how much the velocity jumps at the seams of a span or inside exceed what they may (1: just not), in
-    words, and at which frame; words call the first frame `first`."""
+    """The largest of `excesses`."""
+    return max([(0.0, "", span.start), *excesses(current, known, span, bounds, first)])
+
+
+def excesses(
+    current: Clip, known: Observation, span: Span, bounds: Bounds | None, first: int
+) -> list[tuple[float, str, int]]:
+    """By how much the velocity jumps at the seams of a span, and those inside, exceed what they may (1: just
+    not), in words, and at which frame; words call the first frame `first`."""
     names = current.skeleton.names
     bounds = bounds or Bounds.untold(current.skeleton, current.fps)
-    found = [(0.0, "", span.start)]
+    found = []
     edges = seams.edges(known, current.translated, (span.start, span.stop))
     within = _inner(current, np.arange(span.start, span.stop))
     for frames, jumps, limits, where in (
@@ -160,7 +167,7 @@ def excess(
             jump, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
             words = f"the velocity jumps by {100 * jump:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
             found.append((jump / limit, f"{words} ({names[joint]}, frame {first + frame})", frame))
-    return max(found)
+    return found
 
 
 def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> list[tuple[int, int]]:

@@ -137,7 +137,8 @@ class NoiseReport:
         start, stop: frames start to stop - 1 were looked at.
         strength: what the estimated noise was multiplied with.
         noise: cm, the estimated standard deviation of the joints' positions along an axis, in the mean.
-        moved, moved_most: cm, how far joints moved, in the mean and at most.
+        moved, moved_most: cm, how far joints moved, in the mean and at most; what was put back on its side
+            among them.
         turned, turned_most: degrees, how far they turned against their parents.
         broken: how many values of joints were judged broken, and filled.
         values: how many there are: frames times joints.

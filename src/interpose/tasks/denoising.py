@@ -10,7 +10,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError, few, is_number
 from interpose.finish import Completion, Provenance
-from interpose.finish.denoise import denoised
+from interpose.finish.denoise import denoised, measured
 from interpose.methods import registry
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method
@@ -70,7 +70,9 @@ def denoise(
         done = denoised(
             led, strength, chosen, start, stop, lambda cut, seen: fill(cut, seen, method, seed=seed).clip
         )
-    return with_sides(_with_frozen(done, sides, frozen), swapped)
+    done = with_sides(_with_frozen(done, sides, frozen), swapped)
+    assert done.report.noise is not None
+    return replace(done, report=replace(done.report, noise=measured(done.report.noise, clip, done.clip)))
 
 
 def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:

@@ -19,6 +19,7 @@ from interpose.tasks.planning import plan, seed_of
 
 AHEAD = 2.0  # seconds that a forecast goes on for, if nobody says how long
 HOTTEST = 10.0  # times the noise of the training that may be injected
+FIRST = 1  # the seed of the first of several samples, where none is given
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -96,7 +97,7 @@ def forecast(
         )
     if samples > 1 and not isinstance(registry.get(chosen), Sampler):
         raise registry.one_answer(f"cannot draw {samples} samples with {name}")
-    seeds = [seed] if samples == 1 else [(1 if seed is None else seed) + i for i in range(samples)]
+    seeds = [seed] if samples == 1 else [(FIRST if seed is None else seed) + i for i in range(samples)]
 
     def part(i: int) -> Callable[[float], None] | None:
         return (lambda share: progress((i + share) / samples)) if progress else None
@@ -115,9 +116,11 @@ def forecast(
     if job.note:
         # Why it is no network's, which this was to be.
         done = [_noted(one, job.note) for one in done]
-    first = done[0]
+    # The report tells what was asked for; its gap, what did it.
+    asked = registry.name_of(method)
+    first, *others = (replace(one, report=replace(one.report, method=asked)) for one in done)
     made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
-    made.samples.extend([made, *done[1:]])
+    made.samples.extend([made, *others])
     return made
 
 
