@@ -191,7 +191,21 @@ def test_a_forearm_takes_its_share_of_how_a_hand_turns_about_it(cmu_walk, degree
     assert shares == pytest.approx([degrees / 2, degrees / 2], abs=1.0)
 
 
-@pytest.mark.parametrize("height", [0.45, 0.2])
+@pytest.mark.parametrize("order", [1, -1])
+def test_a_hand_and_its_forearm_are_both_turned_as_pinned(cmu_walk, order):
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    turned = free.kinematics()[0][85]
+    more = rotations.about("X", np.array(1.2))
+    asked = [
+        Pin(name, [85], orientation=rotations.multiply(turn, turned[cmu_walk.skeleton.index(name)])[None])
+        for name, turn in (("LeftHand", more), ("LeftForeArm", rotations.identity()))
+    ]
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=asked[::order]).clip.kinematics()[0][85]
+    for pin in asked:
+        assert rotations.angle(done[cmu_walk.skeleton.index(pin.joint)], pin.orientation[0]) < 1e-3
+
+
+@pytest.mark.parametrize("height", [0.3, 0.1])
 def test_who_reaches_down_bends_as_people_do(cmu_walk, height):
     """In hips and knees: a spine that folds up leaves them where they were."""
     body, hand = find_humanoid(cmu_walk), cmu_walk.skeleton.index("RightHand")

@@ -321,9 +321,12 @@ def test_hips_whose_offset_is_a_place_far_away_are_as_high_as_they_are(tmp_path,
     joints = [*hips, ("Spine", 2, (0.0, 20.0, 0.0), "ZXY")]
     rng = np.random.default_rng(0)
     values = np.zeros((60, 15))
-    way = np.linspace(0, 150 if replaces else 30, 60)
-    heights = 20.0 if low else 80.0
-    place = np.stack([-230.0 - way, heights + rng.normal(0, 2, 60), -235.0 - 0.5 * way], axis=1)
+    # It walks towards the other side of the floor, so that each axis of it is the steadier one for a while.
+    way = np.linspace(0, 40 if replaces else 30, 60)
+    heights = 25.0 if low else 80.0
+    place = np.stack([-230.0 - 0.1 * way, heights + rng.normal(0, 9, 60), 300.0 + 0.2 * way], axis=1)
+    if not replaces:
+        place[:, 1] = place[:1, 1] + 0.2 * (place[:, 1] - place[:1, 1])
     values[:, 6:9] = place if replaces else place - place[0]
     path = tmp_path / "a.bvh"
     path.write_text(make_bvh(joints, values))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from interpose import tasks
+from interpose.errors import RequestError
 from interpose.formats import load
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
@@ -93,6 +94,8 @@ def test_who_does_nothing_but_stand_goes_round(walk):
 def test_who_stands_and_then_walks_off_stands_to_go_round(walk):
     """No part of the walk comes back, and the rest hardly moves."""
     at = np.concatenate([np.full(100, 5), np.arange(5, 20)])
+    with pytest.raises(RequestError):  # a second of it is no idle
+        tasks.cycle(walk.with_motion(walk.rotation[at[70:]], walk.translation[at[70:]]))
     time = np.arange(len(at))[:, None] / 30
     sway = 0.02 * np.sin(2.1 * time + np.arange(len(walk.skeleton)))
     rotation = rotations.multiply(walk.rotation[at], rotations.exp(sway[..., None] * [1.0, 0.0, 0.0]))

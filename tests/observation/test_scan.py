@@ -555,6 +555,18 @@ def test_a_body_jumps_whatever_else_is_lost_meanwhile(cmu_walk):
     assert ("frozen", ("LeftHand",), 0, 199) in spans(found)
 
 
+def test_what_is_not_known_is_not_said_to_jump(cmu_walk):
+    clip = cmu_walk.slice(1, 200)
+    names, rotation = clip.skeleton.names, clip.rotation.copy()
+    arm, leg = (names.index(name) for name in ("RightArm", "LeftUpLeg"))
+    rotation[90:, leg] = rotations.multiply(rotation[90:, leg], rotations.about("X", np.array(0.9)))
+    rotation[70:110, arm] = rotations.about("Z", np.where(np.arange(70, 110) < 90, 0.0, 3.0))
+    known = Observation.from_gaps(clip, [Gap(70, 110, ("RightArm", "RightForeArm", "RightHand"))])
+    found = [one for one in scan(clip.with_motion(rotation, clip.translation), known) if one.kind == "jump"]
+    assert [one.start for one in found] == [90]
+    assert found[0].note.startswith("Left")
+
+
 def test_a_body_that_runs_jumps_as_far_as_one_that_stands(data):
     clip = load(data / "cmu_run.bvh")
     clip = clip.slice(1, len(clip))

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter1d
+from tests.skeletons import rigs
 from tests.skeletons.rigs import TARGET, under_root
 
 import interpose
 from interpose.geometry import rotations
 from interpose.geometry.ground import turn
 from interpose.observation.timeline import Placement, lay, plausible_length
+from interpose.skeletons import find_humanoid
 from interpose.skeletons.carrier import carriers, hips_of, moved
 
 
@@ -187,3 +189,23 @@ def test_hips_whose_place_is_known_rest_nowhere(cmu_walk):
 def test_a_placement_alone_moves_roots(rigged):
     placement = Placement(0.7, (1.0, 0.0, -2.0))
     assert np.allclose(placement.of(rigged).positions(), placement.at(rigged.positions()), atol=1e-9)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.1])
+def test_a_root_turns_for_hips_that_never_turn_against_it(cmu_walk, data, aside):
+    """3ds Max's Biped: in a gap, and where another motion is brought onto it, though the hips hang aside."""
+    biped, _ = rigs.build("biped", cmu_walk)
+    pelvis = biped.skeleton.index("Bip01_Pelvis")
+    rest = biped.skeleton.rest_translation.copy()
+    rest[pelvis] = [0.0, aside, 0.1 * aside]
+    biped = replace(biped, skeleton=replace(biped.skeleton, rest_translation=rest))
+    filled = interpose.fill(biped, (60, 100), method="small").clip
+    brought = interpose.retarget(interpose.load(data / "cmu_jump.bvh"), biped)
+    for made in (filled, brought):
+        assert rotations.angle(made.rotation[:, pelvis], biped.rotation[0, pelvis]).max() < 1e-6
+        assert rotations.angle(made.rotation[:, 0], made.rotation[0, 0]).max() > 0.1
+    body = find_humanoid(biped)
+    off = np.linalg.norm(body.positions(filled) - body.positions(biped), axis=-1)
+    assert off[60:100].mean() < 0.06
+    steps = np.linalg.norm(np.diff(filled.positions()[58:102], 2, axis=0), axis=-1)
+    assert steps.max() < 0.04

@@ -73,6 +73,7 @@ def recover(
     from interpose.finish.guarantees import STOOD
     from interpose.observation import Gap
     from interpose.observation.finding import NO_GAPS, STUCK
+    from interpose.observation.frozen import stuck
     from interpose.observation.scan import OR, scan, stays
 
     check_method(method, license)
@@ -92,7 +93,10 @@ def recover(
     seen = scan(done.clip) if looked else []
     others = [one for one in seen if one.kind not in NO_GAPS]
     # Once joints move again that were stuck with all of a pose, the rest of it is a body that is stuck.
-    again = [f"{names(one.joints)} {one.start}:{one.stop}" for one in seen if one.kind in STUCK]
+    held = [one for one in seen if one.kind in STUCK and one.start < gap.stop and gap.start < one.stop]
+    before = [(one.kind, one.start, one.stop) for one in stuck(clip)] if held else []
+    held = [one for one in held if (one.kind, one.start, one.stop) not in before]
+    again = [f"{names(one.joints)} {one.start}:{one.stop}" for one in held]
     sides = ""
     if either := [one for one in seen if OR in one.note]:
         part = f"{either[0].start}:{either[0].stop}"

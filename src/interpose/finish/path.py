@@ -113,10 +113,14 @@ def _turns(old: np.ndarray, new: np.ndarray, near: np.ndarray, fps: float) -> np
 def _no_faster(values: np.ndarray, step: float) -> np.ndarray:
     """Values (n,), 0 at both ends, that change by no more than a step from each to the next: midway between
     the lowest such ones that are nowhere below these and the highest nowhere above. What is as slow stays."""
-    at = np.arange(len(values))
-    way = step * np.abs(np.subtract.outer(at, at))
-    most = np.minimum(way[0], way[-1])
-    return np.clip(((values + way).min(axis=1) + (values - way).max(axis=1)) / 2, -most, most)
+    way = step * np.arange(len(values))
+
+    def above(some: np.ndarray) -> np.ndarray:
+        return np.maximum.accumulate(some + way) - way
+
+    high, low = (np.maximum(above(some), above(some[::-1])[::-1]) for some in (values, -values))
+    most = np.minimum(way, way[::-1])
+    return np.clip((high - low) / 2, -most, most)
 
 
 def _smooth(values: np.ndarray, fps: float) -> np.ndarray:

@@ -6,7 +6,7 @@ around it, and all joints that are free share it, feet and the other pins last.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from itertools import chain, repeat
 
 import numpy as np
@@ -257,14 +257,17 @@ def _meet(
     clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray, axes: Axes | None
 ) -> Clip:
     placed = [pin for pin in pins if pin.position is not None]
+    # Those above first: they turn what hangs on them.
     turned = [pin for pin in pins if pin.orientation is not None]
+    turned.sort(key=lambda pin: clip.skeleton.index(pin.joint))
+    fixed = {clip.skeleton.index(pin.joint) for pin in turned}
     # Turning a joint moves what hangs on it, so where both are asked for both are done twice.
     for _ in range(2 if placed and turned else 1):
         if placed:
             clip = _place(clip, known, placed, edges, down, axes)
             down = np.zeros_like(down)
         for pin in turned:
-            clip = _turn(clip, known, pin, edges)
+            clip = _turn(clip, known, pin, edges, fixed)
     return clip
 
 
@@ -387,8 +390,8 @@ def _approach(
     return clip.rotation, clip.translation
 
 
-def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
-    """Turn a joint as a pin says, where its own rotation is free."""
+def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int], fixed: Collection[int]) -> Clip:
+    """Turn a joint as a pin says, where its own rotation is free; those that are `fixed` are pinned, too."""
     joint = clip.skeleton.index(pin.joint)
     turned, _ = clip.kinematics()
     off = _unrolled(
@@ -396,7 +399,8 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int]) -> Clip:
     )
     change = _between(len(clip), np.asarray(pin.frames), off, edges, clip.fps)
     free = ~known.rotation[:, joint, None]
-    clip = _forearm_turned(clip, known, joint, np.where(free, change, 0.0))
+    if clip.skeleton.parents[joint] not in fixed:
+        clip = _forearm_turned(clip, known, joint, np.where(free, change, 0.0))
     done, parent = rotations.multiply(rotations.exp(change), turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
         done = rotations.relative(clip.kinematics()[0][:, parent], done)

@@ -28,6 +28,7 @@ ROUND, CLOSES = 8.0, 0.5
 NEARLY = 0.01
 MOST = 5  # ways to go round that are told
 LIVELY = 0.7  # of the pace of a whole clip: what moves less than that stands in it
+STANDS = 2.0  # seconds for which at least who does something else, too, stands to go round so
 TURNED = 0.05  # metres that joints may be apart instead of the body going round by a radian
 
 
@@ -139,7 +140,7 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
     usual = float(np.linalg.norm(seen - seen.mean(axis=0), axis=2).mean())
     idles = CLOSES * usual < NEARLY
 
-    def alike(within: float, lively: float) -> list[tuple[float, int, int]]:
+    def alike(within: float, lively: float, least: int) -> list[tuple[float, int, int]]:
         found = []
         for lag in range(least, most + 1):
             apart = np.linalg.norm(seen[lag:] - seen[:-lag], axis=2).mean(axis=1)
@@ -150,9 +151,9 @@ def cycles(body: Humanoid, clip: Clip) -> list[tuple[int, int, float]]:
             found += [(float(apart[i]), int(i), int(i) + lag) for i in at[np.argsort(apart[at])[:MOST]]]
         return found
 
-    found = alike(NEARLY if idles else CLOSES * usual, LIVELY)
+    found = alike(NEARLY if idles else CLOSES * usual, LIVELY, least)
     if not found:
-        idles, found = True, alike(NEARLY, 0.0)
+        idles, found = True, alike(NEARLY, 0.0, round(STANDS * clip.fps))
     chosen: list[tuple[int, int, float]] = []
     for apart_by, start, stop in sorted(found, key=lambda one: (one[1] - one[2], one) if idles else one):
         if len(chosen) == MOST:

@@ -12,8 +12,6 @@ from interpose.errors import RequestError, unfit
 from interpose.geometry import rotations
 from interpose.geometry.ground import UP
 from interpose.observation.observation import Observation, frame_number, joint_names
-from interpose.skeletons import JOINTS
-from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
 from interpose.skeletons.fitting import SAME
 from interpose.skeletons.humanoid import find_humanoid
@@ -98,17 +96,16 @@ def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part
 
 
 def _ahead(clip: Clip) -> np.ndarray:
-    """(F, 4) the turn about the vertical to where the hips face.
+    """(F, 4) by how much hips are turned about the vertical.
 
-    A hip joint's own turn tells it where it rests as the body stands; LAFAN1's rests on its side, so that to
-    lean is to turn about the vertical, too.
+    Of a humanoid since its T-pose: LAFAN1's hip joints rest on their side, so that to lean is to turn them
+    about the vertical, too. (The line of the hips flips where a body rolls over.)
     """
-    if not find_mapping(clip.skeleton).usable:
+    if find_mapping(clip.skeleton).usable:
+        turned = find_humanoid(clip).rotations(clip)[:, 0]
+    else:
         turned = clip.kinematics()[0][:, hips_of(clip.skeleton)]
-        return rotations.twist_about(turned, UP.values)
-    placed = find_humanoid(clip).positions(clip)
-    pair = np.isin(JOINTS, ("LeftUpLeg", "RightUpLeg"))
-    return rotations.about("Y", facing(placed, np.broadcast_to(pair, placed.shape[:-1])))
+    return rotations.twist_about(turned, UP.values)
 
 
 def _check(clip: Clip, observation: Observation, part: Part) -> None:

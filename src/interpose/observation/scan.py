@@ -193,7 +193,7 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
             jumps[max(end - 2, 0) : end + 1] = False
     found = []
     for step in np.flatnonzero(jumps.any(axis=1)).tolist():
-        joint = int(steps[step].argmax())
+        joint = int(np.where(jumps[step], steps[step], 0.0).argmax())
         way = float(steps[step, hips] if jumps[step, hips] else steps[step, joint])
         speed = f"{way:.2f} m further from one frame to the next, {way * clip.fps:.0f} m/s"
         what = "the body is" if jumps[step, hips] else f"{clip.skeleton.names[joint]} is"

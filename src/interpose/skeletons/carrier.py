@@ -98,8 +98,8 @@ def rooted(clip: Clip, known: np.ndarray, turns: np.ndarray, cut: int = 0) -> Cl
 
     As far aside of them as before and after, if it goes along with them in all known frames (what game
     engines call root motion); or where it was, if it stands still in these. If it turns along with them, it
-    does so, too, as smoothly. What is upright in all known frames, or at one height, stays so. The body stays
-    where it is.
+    does so, too, as smoothly; and if they never turn against it, as in 3ds Max's Biped, all turns are its
+    own. What is upright in all known frames, or at one height, stays so. The body stays where it is.
 
     Args:
         clip: F frames.
@@ -108,8 +108,10 @@ def rooted(clip: Clip, known: np.ndarray, turns: np.ndarray, cut: int = 0) -> Cl
     """
     hips = hips_of(clip.skeleton)
     above = [joint for joint in clip.skeleton.ancestors(hips) if joint in clip.translated]
-    if not above or hips not in clip.translated:
+    if not above:
         return clip
+    if hips not in clip.translated:
+        return _turning(clip, known, turns)
     root, (turned, placed) = above[-1], clip.kinematics()
     aside = (placed[:, root] - placed[:, hips]) * [1.0, 0.0, 1.0]
     both = np.asarray(known[:, [hips, root]].all(axis=1))
@@ -133,6 +135,31 @@ def rooted(clip: Clip, known: np.ndarray, turns: np.ndarray, cut: int = 0) -> Cl
         turn = _facing(turn, turned[:, hips], both, free, clip.fps, cut)
     led = moved(clip, {root: (turn, there)})
     return moved(led, {hips: (turned[:, hips], placed[:, hips])})
+
+
+def _turning(clip: Clip, known: np.ndarray, turns: np.ndarray) -> Clip:
+    """The clip with a root that turns as hips do which hang from it and turn against it in no known frame;
+    arguments as in `rooted`."""
+    hips = hips_of(clip.skeleton)
+    root, body = clip.skeleton.parents[hips], find_mapping(clip.skeleton).mapped[1]
+    if root not in clip.translated or not clip.skeleton.below[list(body), hips].all():
+        return clip
+    both = turns[:, [hips, root]].all(axis=1)
+    free = np.logical_not(turns[:, [hips, root]].any(axis=1) | known[:, root])
+    if both.sum() < 2 or not free.any():
+        return clip
+    against, own = clip.rotation[both, hips], clip.rotation[both, root]
+    if rotations.angle(against, against[:1]).max() > STILL or rotations.angle(own, own[:1]).max() < STILL:
+        return clip
+    turned, placed = clip.kinematics()
+    turn = rotations.multiply(turned[:, hips], rotations.conjugate(against[0]))
+    reach = rotations.rotate(rotations.conjugate(turned[:, root]), placed[:, hips] - placed[:, root])
+    turn = np.where(free[:, None], turn, turned[:, root])
+    place = np.where(free[:, None], placed[:, hips] - rotations.rotate(turn, reach), placed[:, root])
+    led = moved(clip, {root: (turn, place)})
+    rotation = led.rotation.copy()
+    rotation[free, hips] = against[0]
+    return led.with_motion(rotation, led.translation)
 
 
 def _facing(

@@ -21,9 +21,9 @@ from interpose.skeletons import find_mapping
 # who lies or crawls do, to .14 of their height at least in each of 1,545 excerpts of all data sets, of five
 # seconds each.
 ADDS = 0.12
-# Axes along which an OFFSET is more than this share of where it is largest, and how far from it values stay
-# that are near it, as a share of it.
-FAR, NEAR = 0.15, 0.35
+# Axes along which an OFFSET is more than this share of where it is largest; and the share of it below which
+# values are on the other side of the origin.
+FAR, ACROSS = 0.15, -0.5
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -146,8 +146,8 @@ def _joint_positions(
 
     Every joint votes, by where it is along the axis on which its OFFSET is largest, beside how far it goes
     there: it adds if it stays at zero and below. Hips below a root travel, and are low where people crawl,
-    but not as low as that. Where the OFFSET is a place far away that they are on the other side of, they are
-    still about as high: so what stays near its OFFSET along any axis replaces it.
+    but not as low as that. Where the OFFSET is a place far away, they may be on the other side of the origin
+    along it, and tell nothing there.
     """
     padded = np.concatenate([sample, np.zeros((len(sample), 1))], axis=1)
     votes = []
@@ -157,10 +157,11 @@ def _joint_positions(
         offset = np.where(columns >= 0, nodes[joint].offset, 0.0)
         values, size = padded[:, columns], np.abs(offset).max()
         if size > 1e-6:
+            tells = np.abs(offset) / (values.std(axis=0) + 0.1 * size)
             far = np.abs(offset) > FAR * size
-            near = np.percentile(np.abs(values[:, far] / offset[far] - 1), 80, axis=0) < NEAR
-            axis = np.argmax(np.abs(offset) / (values.std(axis=0) + 0.1 * np.abs(offset) + 0.01 * size))
-            votes.append(bool(near.any() or np.percentile(values[:, axis] / offset[axis], 95) > ADDS))
+            across = far & (np.median(values, axis=0) / np.where(far, offset, 1.0) < ACROSS)
+            axis = np.argmax(np.where(across & (far & ~across).any(), 0.0, tells))
+            votes.append(bool(np.percentile(values[:, axis] / offset[axis], 95) > ADDS))
     if all(nodes[joint].parent < 0 for joint in layout.translated):
         return "none", ""
     if given:
