@@ -118,3 +118,27 @@ def test_forecasts_of_who_shuffles_do_not_run(cmu_walk):
     pace = np.linalg.norm(np.diff(done.root[:, [0, 2]], axis=0), axis=1)
     own = max(pace[at : at + 15].mean() for at in range(130, 175))
     assert max(pace[at : at + 15].mean() for at in range(190, 295)) < 1.3 * own
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_further_a_forecast_goes_the_more_it_is_expected_to_be_off(backwards):
+    """Later windows know what earlier ones guessed, and would be as sure as the first one."""
+    told = base._Errors(np.full(100, np.nan), False, True)
+    seen = np.linspace(0.1, 0.5, 40)
+    told.open(seen[::-1] if backwards else seen, (10, 90), backwards)
+    told.open(np.full(40, 9.0), (10, 50), backwards)  # the first one counts
+    wrong = told.expected[10:90][:: -1 if backwards else 1]
+    np.testing.assert_allclose(wrong[:40], seen)
+    assert (np.diff(wrong) > 0).all()
+    assert wrong[-1] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_more_frames_are_not_expected_to_be_nearer(cmu_walk, first):
+    expected = []
+    for frames in (60, 150, 240):
+        clip = cmu_walk.take(np.concatenate([np.arange(1, 90), np.full(frames, 89)]))
+        clip = clip.take(np.arange(len(clip))[:: -1 if first else 1])
+        gap = (0, frames) if first else (89, 89 + frames)
+        expected.append(interpose.fill(clip, gap, method="small").report.gaps[0].expected)
+    assert expected == sorted(expected)

@@ -458,25 +458,29 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
         fastest = steady_pace(motion.root[end:][::-1] if backwards else motion.root[:begin])
     # A body whose hips are known gets nowhere: limbs that hang from it are off by no more and more.
     errors = _Errors(done.expected, closed, not motion.known[begin:end, [0, -1]].all())
+    hole = begin, end
     while begin < end:
         first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
         if end - begin > sight:
             first, last = (end - sight, last) if backwards else (first, begin + sight)
         # The first window that sees all that is left tells the errors of all of it.
         sees_all = end - begin <= sight
-        part, hole = slice(first, last), slice(begin - first, end - first)
+        part, ahead = slice(first, last), slice(max(begin - first, 0), end - first)
         inside = slice(begin, end)
         if end - begin > last_step:
             inside = slice(end - step, end) if backwards else slice(begin, begin + step)
         own = slice(inside.start - first, inside.stop - first)
         each = ask(cards, motion.part(part), own)
         said = agreed(each, own)
-        if in_turn and sees_all and said.expected[hole].mean() <= SURE:
-            inside, own = slice(begin, end), hole
+        if in_turn and sees_all and said.expected[ahead].mean() <= SURE:
+            inside, own = slice(begin, end), ahead
             said = agreed(each, own)
         for held_back, new in ((done.stands, said.stands), (done.expected, said.expected)):
             held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
-        errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
+        if whole and not closed:
+            errors.open(said.expected[ahead], hole, backwards)
+        else:
+            errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
         if astray and not sees_all:
             said = agreed(ask(cards, led(motion, begin, end).part(part), own), own)
         if fastest is not None:
@@ -548,6 +552,17 @@ class _Errors:
     adds: bool
     carried: list[float] = field(default_factory=lambda: [0.0, 0.0])
     told: bool = False
+
+    def open(self, said: np.ndarray, hole: tuple[int, int], backwards: bool) -> None:
+        """Note what the first window says of a hole with one known side, from there on as far as it sees.
+        What is further away is off by as much more: later windows start from what is a guess by then."""
+        if self.told:
+            return
+        self.told = True
+        begin, end = hole
+        seen, frames = said[::-1] if backwards else said, np.arange(end - begin)
+        wrong = np.concatenate([seen, seen[-1:] * (frames[len(seen) :] + 1) / max(len(seen), 1)])
+        self.expected[begin:end] = wrong[::-1] if backwards else wrong
 
     def tell(self, said: np.ndarray, first: int, over: slice, backwards: bool, all_left: bool) -> None:
         """Note what a window from frame `first` on says of the frames `over`, which may be `all_left`; it
