@@ -641,6 +641,17 @@ def test_what_several_methods_said_is_kept_apart_by_joint(cmu_walk):
     assert 100 * done.raw.expected[40:60].mean() == pytest.approx(done.report.gaps[0].expected)
 
 
+def test_feet_of_a_gap_in_pieces_travel_as_far_as_they_do(long_walk):
+    """Windows overlap, and each tells of its own frames alone: it was a fifth too far."""
+    joints = ("LeftUpLeg", "LeftLeg", "LeftFoot")
+    done = tasks.recover(long_walk, joints, method="linear")
+    (gap,) = done.report.gaps
+    known = Observation.from_gaps(long_walk, [Gap(0, len(long_walk), joints)])
+    _, travel = feet.measure(done.clip, known, 0, len(long_walk))
+    assert gap.foot_travel == pytest.approx(travel, rel=0.08)
+    assert len(long_walk) > windows.PIECE * long_walk.fps
+
+
 def test_reports_of_pieces_are_joined_whole():
     """The worst of what must not be, means of what is a mean, and what only the second piece has."""
     first = GapReport(0, 100, ("Head",), "small", 1, penetration=1.0, expected=2.0)

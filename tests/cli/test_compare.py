@@ -30,7 +30,9 @@ def test_each_does_what_fill_does_by_it(run, take):
         filled = run(
             "fill", "take.bvh", "--gap", "60:90", "--method", one["method"], "--json", "--force"
         ).json
-        for name in ("seam_after", "foot_slide", "foot_travel"):
+        assert one["weights"] == filled["weights"]
+        assert one["gaps"][0].keys() == filled["gaps"][0].keys()
+        for name in ("frames", "seam_after", "foot_slide", "foot_travel"):
             assert one["gaps"][0][name] == filled["gaps"][0][name]
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 from cyclopts import Parameter
 
 from interpose.cli.console import effort, figure, names, progress, say, say_json, say_table, seconds
-from interpose.cli.outputs import UNITS, write_text
+from interpose.cli.outputs import UNITS, gap_entries, used, write_text
 from interpose.cli.reading import Reading, describe, details, split_names
 from interpose.cli.whole import Whole
 from interpose.errors import RequestError
@@ -97,7 +97,9 @@ def compare(
     auto = {job.number: job.method.name for job in jobs if job.method}
     write_text(page, _page(clip, done, [job.gap for job in jobs], page.name))
     if json:
-        entries = [{"method": name, "gaps": made.report.to_dict()["gaps"]} for name, made in done.items()]
+        entries = [
+            {"method": name, "gaps": gap_entries(made), "weights": used(made)} for name, made in done.items()
+        ]
         say_json(
             {"input": str(file), **details(clip), "auto": auto, "compared": entries, "page": str(page)}
             | {"units": UNITS}

@@ -174,16 +174,6 @@ def to_json(
         more: what only this verb says.
     """
     report = completion.report.to_dict()
-
-    def entry(number: int, gap: dict[str, Any]) -> dict[str, Any]:
-        joints = gap["joints"]
-        rest = {
-            name: value
-            for name, value in gap.items()
-            if name not in ("number", "start", "stop", "joints", "weights")
-        }
-        return {"number": number, "frames": f"{gap['start']}:{gap['stop']}", "joints": joints, **rest}
-
     return {
         "interpose": __version__,
         "verb": verb,
@@ -194,7 +184,7 @@ def to_json(
         **({"action": report["action"]} if report["action"] else {}),
         "seed": seed,
         **more,
-        "gaps": [entry(gap["number"], gap) for gap in report["gaps"]],
+        "gaps": gap_entries(completion),
         "open": [
             {
                 "number": number,
@@ -208,6 +198,19 @@ def to_json(
         "weights": used(completion),
         "units": UNITS,
     }
+
+
+def gap_entries(completion: Completion) -> list[dict[str, Any]]:
+    """What a report says of each filled gap."""
+    return [
+        {
+            "number": gap["number"],
+            "frames": f"{gap['start']}:{gap['stop']}",
+            "joints": gap["joints"],
+            **{name: value for name, value in gap.items() if name not in ("start", "stop", "weights")},
+        }
+        for gap in completion.report.to_dict()["gaps"]
+    ]
 
 
 def used(completion: Completion) -> list[dict[str, Any]]:

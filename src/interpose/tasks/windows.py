@@ -115,8 +115,11 @@ def shifted(reports: Iterable[GapReport], by: int, start: int, stop: int, job: J
     for one in reports:
         if one.start + by < stop and one.stop + by > start:
             first, last = max(one.start + by, start), min(one.stop + by, stop)
+            # Where windows overlap each tells of its own frames alone.
+            share = (last - first) / (one.stop - one.start)
+            travel = None if one.foot_travel is None else share * one.foot_travel
             notes = ((job.note,) if job.note else ()) + one.notes
-            yield replace(one, start=first, stop=last, number=job.number, notes=notes)
+            yield replace(one, start=first, stop=last, number=job.number, notes=notes, foot_travel=travel)
 
 
 def joined(reports: list[GapReport]) -> list[GapReport]:
