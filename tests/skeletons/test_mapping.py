@@ -307,6 +307,23 @@ def test_helpers_that_are_called_like_what_they_help_are_none_of_it(cmu_walk):
     assert found == expected
 
 
+def test_of_rigify_s_bones_those_that_deform_are_the_body(cmu_walk):
+    """Files with all of them hold each limb several times, ORG- first."""
+    clip, expected = rigs.build("rigify", cmu_walk)
+    old = clip.skeleton
+    assert any(name.startswith("DEF-") for name in old.names)
+    more = tuple(name.replace("DEF-", "ORG-") if "DEF-" in name else f"ORG-{name}" for name in old.names)
+    count = len(old)
+    parents = (
+        -1,
+        *(parent + 1 for parent in old.parents),
+        *(p + 1 + count if p >= 0 else 0 for p in old.parents),
+    )
+    rest = np.concatenate([np.zeros((1, 3)), old.rest_translation, old.rest_translation])
+    names = ("root", *more, *old.names)
+    assert named(Skeleton(names, parents, rest)) == expected
+
+
 @pytest.mark.parametrize("prefix", ["Body_", "Head_", "R_", "FullBody_", "man_l_", "mixamorig:"])
 @pytest.mark.parametrize("heap", [False, True])
 def test_a_prefix_may_be_a_part_or_a_side(cmu_walk, prefix, heap):

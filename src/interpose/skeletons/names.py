@@ -90,6 +90,9 @@ def _shared(named: list[list[str]]) -> list[str]:
 def read(names: tuple[str, ...]) -> list[Said]:
     """What the names of a skeleton's joints say."""
     cut = [words(name) for name in names]
+    if any(one[:1] == ["def"] for one in cut):
+        # Blender's Rigify: of several bones of a name those that deform are the body.
+        cut = [[] if one[:1] in (["org"], ["mch"]) else one for one in cut]
     shared = _shared(cut)
     readings = []
     for count in range(len(shared) + 1):
