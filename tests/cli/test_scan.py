@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from interpose.clip import Clip, Skeleton
 from interpose.formats import load, save
 from interpose.geometry import rotations
 from interpose.observation.finding import Finding
@@ -76,3 +77,19 @@ def test_what_is_stuck_once_the_rest_moves_is_told_of(run, take, monkeypatch):
     assert done.code == 4
     assert "Stuck, now that the rest moves: Hips, Spine 20:31" in done.out
     assert "interpose recover odd.recovered.bvh, once more" in done.out
+
+
+def test_another_body_is_said_to_be_one(run, take):
+    """Whose limbs nothing is looked for in."""
+    clip = load(take)
+    old = clip.skeleton
+    count = len(old)
+    names = (*old.names, *(f"B_{name}" for name in old.names))
+    parents = (*old.parents, *(parent + count if parent >= 0 else -1 for parent in old.parents))
+    both = Skeleton(names, parents, np.tile(old.rest_translation, (2, 1)))
+    two = Clip(
+        both, np.tile(clip.rotation, (1, 2, 1)), np.tile(clip.translation, (1, 2, 1)), clip.fps, (0, count)
+    )
+    save(two, take.with_name("two.bvh"))
+    assert f"the {count} joints of B_{old.names[0]} are another body" in run("scan", "two.bvh").out
+    assert "another body" not in run("scan", take.name).out

@@ -37,6 +37,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         json: print JSON for other programs.
     """
     from interpose.finish.feet import legs
+    from interpose.finish.notes import bodies
     from interpose.observation.finding import to_gaps
     from interpose.observation.scan import OR, scan, stays
     from interpose.skeletons.carrier import line_of
@@ -61,6 +62,10 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say_json({"input": str(file), **details(clip), "findings": findings, "filled": _frames(made)})
         return
     say("\n".join(describe(file, clip)))
+    for name, count in bodies(clip.skeleton).items():
+        say(
+            f"the {count} joints of {name} are another body: --root {quote(name)} looks for its limbs' faults"
+        )
     if made:
         say(f"filled by interpose, as the report beside it says: {', '.join(_frames(made))}")
     where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."

@@ -94,18 +94,18 @@ def sized(skeleton: Skeleton) -> list[str]:
 
 def others(skeleton: Skeleton, gap: Gap) -> list[str]:
     """Notes where a gap is one of more bodies than the one that networks fill."""
+    return [
+        f"the {count} joints of {name} are another body, and interpolated: --root {name} fills it"
+        for name, count in (bodies(skeleton).items() if gap.joints is None else ())
+    ]
+
+
+def bodies(skeleton: Skeleton) -> dict[str, int]:
+    """The other bodies of a file, beside the humanoid that is looked at: their roots, and how many joints."""
     mapping = find_mapping(skeleton)
-    if not mapping.usable or gap.joints is not None:
-        return []
     mine = {skeleton.ancestors(joint)[-1] for joint in mapping.mapped[1] if skeleton.ancestors(joint)}
-    said = []
-    for root in (root for root in skeleton.roots if root not in mine):
-        count = int(skeleton.below[:, root].sum())
-        if count >= BODY:
-            name = skeleton.names[root]
-            what = f"the {count} joints of {name} are another body, and interpolated"
-            said.append(f"{what}: --root {name} fills it")
-    return said
+    counts = {root: int(skeleton.below[:, root].sum()) for root in skeleton.roots if root not in mine}
+    return {skeleton.names[root]: n for root, n in counts.items() if n >= BODY and mapping.usable}
 
 
 def wild(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
