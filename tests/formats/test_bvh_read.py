@@ -315,18 +315,26 @@ def test_against_pymotion(data, tmp_path, make_bvh, body):
 
 @pytest.mark.parametrize("replaces", [True, False])
 @pytest.mark.parametrize("low", [False, True])
-def test_hips_whose_offset_is_a_place_far_away_are_as_high_as_they_are(tmp_path, make_bvh, replaces, low):
+@pytest.mark.parametrize("there", [-230.0, -60.0, 10.0, 190.0])
+@pytest.mark.parametrize("turned", [False, True])
+def test_hips_whose_offset_is_a_place_far_away_are_as_high_as_they_are(
+    tmp_path, make_bvh, replaces, low, there, turned
+):
     """On the other side of the origin: their height tells, and not that they are nowhere near."""
     hips = [("Root", 0, (0.0, 0.0, 0.0), "xyzZXY"), ("Hips", 1, (209.3, 92.7, -309.3), "xyzZXY")]
-    joints = [*hips, ("Spine", 2, (0.0, 20.0, 0.0), "ZXY")]
+    if turned:  # Z up
+        hips[1] = ("Hips", 1, (209.3, 309.3, 92.7), "xyzZXY")
+    joints = [*hips, ("Spine", 2, (0.0, 0.0, 20.0) if turned else (0.0, 20.0, 0.0), "ZXY")]
     rng = np.random.default_rng(0)
     values = np.zeros((60, 15))
     # It walks towards the other side of the floor, so that each axis of it is the steadier one for a while.
     way = np.linspace(0, 40 if replaces else 30, 60)
     heights = 25.0 if low else 80.0
-    place = np.stack([-230.0 - 0.1 * way, heights + rng.normal(0, 9, 60), 300.0 + 0.2 * way], axis=1)
+    place = np.stack([there - 0.1 * way, heights + rng.normal(0, 9, 60), 300.0 + 0.2 * way], axis=1)
     if not replaces:
         place[:, 1] = place[:1, 1] + 0.2 * (place[:, 1] - place[:1, 1])
+    if turned:
+        place = place[:, [0, 2, 1]]
     values[:, 6:9] = place if replaces else place - place[0]
     path = tmp_path / "a.bvh"
     path.write_text(make_bvh(joints, values))

@@ -324,6 +324,41 @@ def test_of_rigify_s_bones_those_that_deform_are_the_body(cmu_walk):
     assert named(Skeleton(names, parents, rest)) == expected
 
 
+def test_where_the_bones_that_deform_are_no_body_the_others_are(cmu_walk):
+    """Of Rigify's own rigs, on which they hang one by one from the others."""
+    old, parents, rest = (
+        cmu_walk.skeleton,
+        list(cmu_walk.skeleton.parents),
+        cmu_walk.skeleton.rest_translation,
+    )
+    names = [f"ORG-{name}" for name in old.names] + [f"DEF-{name}" for name in old.names]
+    skeleton = Skeleton(names, [*parents, *range(len(old))], np.concatenate([rest, np.zeros_like(rest)]))
+    assert find_mapping(skeleton).joints == find_mapping(old).joints
+
+
+@pytest.mark.parametrize("limb", ["Leg", "Arm"])
+def test_names_of_two_limbs_tell_the_sides_of_all_four(cmu_walk, limb):
+    """A body that faces backwards in its zero pose, without toes to tell."""
+    old, keep = cmu_walk.skeleton, []
+    for joint, name in enumerate(old.names):
+        if not any(part in name for part in ("Toe", "Finger", "Thumb", "Index")):
+            keep.append(joint)
+    at = {joint: row for row, joint in enumerate(keep)}
+    parents = [at.get(old.parents[joint], -1) for joint in keep]
+    rest = old.rest_translation[keep] * [-1.0, 1.0, -1.0]
+    told = [old.names[joint] for joint in keep]
+    letters = [
+        ("_L" if "Left" in name else "_R") if limb in name and ("Left" in name or "Right" in name) else ""
+        for name in told
+    ]
+    mapping = find_mapping(Skeleton([f"q{row}{letter}" for row, letter in enumerate(letters)], parents, rest))
+    assert mapping.usable
+    for part in ("UpLeg", "Leg", "Arm", "ForeArm"):
+        own = mapping["Left" + part]
+        assert own is not None
+        assert "Left" in told[own], part
+
+
 @pytest.mark.parametrize("prefix", ["Body_", "Head_", "R_", "FullBody_", "man_l_", "mixamorig:"])
 @pytest.mark.parametrize("heap", [False, True])
 def test_a_prefix_may_be_a_part_or_a_side(cmu_walk, prefix, heap):

@@ -171,7 +171,12 @@ def find_mapping(skeleton: Skeleton) -> Mapping:
                 f"it does not hang below {root}, which is said to be the root",
                 "Name a joint of that character, or another root.",
             )
-    found = [_find(skeleton, some, given) for some in inside]
+    found = []
+    for some in inside:
+        # Of several chains the one that deforms is the body, where it is a whole one.
+        chosen = [any(map(names.DEFORMS.match, skeleton.names)), False]
+        tried = (_find(skeleton, some, given, deforming) for deforming in dict.fromkeys(chosen))
+        found.append(max(tried, key=lambda mapping: (mapping.usable, len(mapping.mapped[0]))))
     return _check(max(found, key=lambda mapping: (mapping.usable, len(mapping.mapped[0]))))
 
 
@@ -206,10 +211,10 @@ def _below(skeleton: Skeleton, root: int) -> list[int]:
     return sorted(inside)
 
 
-def _find(skeleton: Skeleton, inside: list[int], given: dict[str, int | None]) -> Mapping:
-    """The mapping of the joints `inside`."""
+def _find(skeleton: Skeleton, inside: list[int], given: dict[str, int | None], deforming: bool) -> Mapping:
+    """The mapping of the joints `inside`, by all names or those of `deforming` bones alone."""
     here = {name: joint for name, joint in given.items() if joint is None or joint in inside}
-    said = dict(zip(inside, names.read(tuple(skeleton.names[joint] for joint in inside))))
+    said = dict(zip(inside, names.read(tuple(skeleton.names[joint] for joint in inside), deforming)))
     chains = _Chains(skeleton, said)
     found, how = chains.limbs()
     if not {"LeftUpLeg", "RightUpLeg", "LeftArm", "RightArm"} <= set(found) and (

@@ -62,6 +62,9 @@ TOOLS, EXTRAS = set(_TOOLS.split()), set(_EXTRAS.split())
 CUT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 
 
+DEFORMS = re.compile(r"DEF\W")  # how names of bones begin that deform, beside those that move them (Rigify)
+
+
 @dataclass(frozen=True)
 class Said:
     """What a name says: the part (a key of PARTS, or None) and the side: -1 left, 1 right, 0 neither."""
@@ -87,12 +90,11 @@ def _shared(named: list[list[str]]) -> list[str]:
         shared.append(common)
 
 
-def read(names: tuple[str, ...]) -> list[Said]:
-    """What the names of a skeleton's joints say."""
+def read(names: tuple[str, ...], deforming: bool = False) -> list[Said]:
+    """What the names of a skeleton's joints say; or those alone of joints that deform, as of Rigify's."""
     cut = [words(name) for name in names]
-    if any(one[:1] == ["def"] for one in cut):
-        # Blender's Rigify: of several bones of a name those that deform are the body.
-        cut = [[] if one[:1] in (["org"], ["mch"]) else one for one in cut]
+    if deforming:
+        cut = [one if one[:1] == ["def"] else [] for one in cut]
     shared = _shared(cut)
     readings = []
     for count in range(len(shared) + 1):

@@ -123,10 +123,19 @@ def _limbs(
     ahead = np.sum(feet, axis=0) if feet else np.array([0.0, 0.0, 1.0])
     left = np.cross(up, ahead)
     found: dict[str, int] = {}
-    for limbs, parts in ((legs, ("UpLeg", "Leg", "Foot", "Toe")), (arms, ("Arm", "ForeArm", "Hand"))):
+
+    def first_is_left(limbs: list[_Limb]) -> tuple[bool, bool | None]:
+        """By the shape, and by names if they tell."""
         apart = shape.placed[limbs[0].middle] - shape.placed[limbs[1].middle]
-        named = [sum(sides.get(joint, 0) for joint in limb.chain) for limb in limbs]
-        first = named[0] < 0 if named[0] * named[1] < 0 else apart @ left > 0
+        said = [sum(sides.get(joint, 0) for joint in limb.chain) for limb in limbs]
+        return bool(apart @ left > 0), said[0] < 0 if said[0] * said[1] < 0 else None
+
+    told = [shaped == said for shaped, said in map(first_is_left, (legs, arms)) if said is not None]
+    if told and not any(told):
+        left = -left  # it is turned round: also where the names of the other limbs say nothing
+    for limbs, parts in ((legs, ("UpLeg", "Leg", "Foot", "Toe")), (arms, ("Arm", "ForeArm", "Hand"))):
+        shaped, said = first_is_left(limbs)
+        first = shaped if said is None else said
         for side, limb in zip(("Left", "Right") if first else ("Right", "Left"), limbs):
             own = dict(zip(parts, limb.chain[limb.at :]))
             if "Toe" in own and shape.length[own["Toe"]] < FOOT * shape.length[[limb.middle, limb.end]].sum():
