@@ -73,6 +73,22 @@ def test_arms_and_legs_swing_on(turns):
     assert (done.local[outside] == said.local[outside]).all()
 
 
+@pytest.mark.parametrize("first", [False, True])
+def test_an_arm_that_is_held_goes_on_so_where_nothing_follows(first):
+    """On the back, say: networks let it hang. One that moved may do anything."""
+    truth, hole = walking(), (0, 90) if first else (FRAMES - 90, FRAMES)
+    arm = [JOINTS.index("Right" + name) for name in ("Arm", "ForeArm", "Hand")]
+    truth.local[:, arm] = rotations.about("Z", np.array(0.9))
+    said = frozen(truth, hole)
+    said.local[slice(*hole), arm] = rotations.identity()
+    done, _ = repeating.carried_on(truth, known(hole=hole), said, BONES)
+    inner = (hole[0], hole[1] - repeating.RESTING) if first else (hole[0] + repeating.RESTING, hole[1])
+    assert rotations.angle(done.local[slice(*inner), arm], truth.local[0, arm]).max() < 1e-6
+    truth.local[:, arm[0]] = rotations.about("Z", 0.9 + 0.01 * np.arange(FRAMES))
+    done, _ = repeating.carried_on(truth, known(hole=hole), said, BONES)
+    assert rotations.angle(done.local[slice(*inner), arm], rotations.identity()).max() < 1e-6
+
+
 def test_in_short_holes_the_network_counts_for_more():
     truth, hole = walking(), (100, 105)
     said = frozen(truth, hole)
