@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy import ndimage
@@ -236,53 +237,47 @@ def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:
 
 def measured(told: NoiseReport, clip: Clip, done: Clip) -> NoiseReport:
     """The report with how far all of a clip was moved and turned to become another one."""
-    part = slice(told.start, told.stop)
-    before, after = (some.slice(part.start, part.stop) for some in (clip, done))
-    again = _report(
-        before,
-        after,
-        np.zeros(before.rotation.shape[:2], bool),
-        np.zeros(len(clip.skeleton)),
-        told.start,
-        0.0,
-    )
-    moves = ("moved", "moved_most", "turned", "turned_most")
-    joints = tuple(
-        replace(one, **{name: getattr(other, name) for name in moves})
-        for one, other in zip(told.joints, again.joints)
-    )
-    return replace(told, joints=joints, **{name: getattr(again, name) for name in moves})
+    whole, each = _movement(*(some.slice(told.start, told.stop) for some in (clip, done)))
+    joints = tuple(replace(one, **own) for one, own in zip(told.joints, each))
+    return replace(told, joints=joints, **whole)
+
+
+def _movement(clip: Clip, done: Clip) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """How far joints move, in cm, and turn, in degrees, from one clip to another, in the mean and at most:
+    all of them, and each."""
+    moved = 100 * np.linalg.norm(done.positions() - clip.positions(), axis=-1)
+    turned = np.degrees(rotations.angle(done.rotation, clip.rotation))
+
+    def told(far: np.ndarray, about: np.ndarray) -> dict[str, Any]:
+        figures = {"moved": far.mean(), "moved_most": far.max()}
+        figures |= {"turned": about.mean(), "turned_most": about.max()}
+        return {name: float(figure) for name, figure in figures.items()}
+
+    return told(moved, turned), [told(far, about) for far, about in zip(moved.T, turned.T)]
 
 
 def _report(
     clip: Clip, done: Clip, lost: np.ndarray, noise: np.ndarray, start: int, strength: float
 ) -> NoiseReport:
-    moved = 100 * np.linalg.norm(done.positions() - clip.positions(), axis=-1)
-    turned = np.degrees(rotations.angle(done.rotation, clip.rotation))
+    whole, each = _movement(clip, done)
     joints = tuple(
         JointNoise(
-            name,
-            100 * float(noise[j]),
-            float(moved[:, j].mean()),
-            float(moved[:, j].max()),
-            float(turned[:, j].mean()),
-            float(turned[:, j].max()),
-            tuple(f"{start + a}:{start + b}" for a, b in runs(lost[:, j])),
+            joint=name,
+            noise=100 * float(noise[j]),
+            broken=tuple(f"{start + a}:{start + b}" for a, b in runs(lost[:, j])),
+            **each[j],
         )
         for j, name in enumerate(clip.skeleton.names)
     )
     return NoiseReport(
-        start,
-        start + len(clip),
-        strength,
-        100 * float(noise[body_of(clip)].mean()),
-        float(moved.mean()),
-        float(moved.max()),
-        float(turned.mean()),
-        float(turned.max()),
-        int(lost.sum()),
-        lost.size,
-        joints,
+        start=start,
+        stop=start + len(clip),
+        strength=strength,
+        noise=100 * float(noise[body_of(clip)].mean()),
+        broken=int(lost.sum()),
+        values=lost.size,
+        joints=joints,
+        **whole,
     )
 
 

@@ -179,11 +179,11 @@ def _jumps(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
     steps = np.linalg.norm(ways, axis=-1)
     # A body that runs goes as far in every step as one that stands jumps.
     unlike = ways[:, hips] - ndimage.median_filter(ways[:, hips], size=(7, 1), mode="nearest")
-    measured = steps.copy()
-    measured[:, hips] = np.linalg.norm(unlike, axis=-1)
-    measured[~seen] = 0.0
-    beside = ndimage.maximum_filter(measured, footprint=[[1]] * 3 + [[0]] + [[1]] * 3, mode="nearest")
-    jumps = (measured > TELEPORTS) & (measured > TIMES * beside)
+    leaps = steps.copy()
+    leaps[:, hips] = np.linalg.norm(unlike, axis=-1)
+    leaps[~seen] = 0.0
+    beside = ndimage.maximum_filter(leaps, footprint=[[1]] * 3 + [[0]] + [[1]] * 3, mode="nearest")
+    jumps = (leaps > TELEPORTS) & (leaps > TIMES * beside)
     skeleton = clip.skeleton
     for one in findings:
         own = [*range(len(skeleton))] if one.joints is None else [*map(skeleton.index, one.joints)]
