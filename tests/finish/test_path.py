@@ -35,6 +35,18 @@ def test_the_path_is_met_and_everything_else_holds(cmu_walk, aside, method):
     assert any("the path is met within 0." in note for note in report.notes)
 
 
+def test_who_is_led_along_a_way_takes_steps_for_it(cmu_walk):
+    """From standing there and back: the network is told of the way, instead of being moved over it."""
+    stands = cmu_walk.take(np.repeat(90, 210))
+    way = (cmu_walk.root[150] - cmu_walk.root[90])[[0, 2]]
+    way /= np.linalg.norm(way)
+    there = {30 + k: stands.root[0, [0, 2]] + way * 0.04 * min(k, 150 - k) for k in range(15, 150, 15)}
+    done = interpose.fill(stands, (30, 180), method="small", path=there)
+    (gap,) = done.report.gaps
+    assert gap.path < 1
+    assert gap.gliding < 0.3
+
+
 def test_the_body_turns_along_the_way_and_the_ends_stay(cmu_walk, aside):
     led = follow(cmu_walk, *GAP, {MIDDLE: aside})
     assert np.linalg.norm(led.root[MIDDLE, [0, 2]] - aside) < 1e-9

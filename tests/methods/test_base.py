@@ -59,7 +59,9 @@ def seen(frames: int, hole: slice, lacks: str = "") -> base.Seen:
     known[hole] = ~has
     local = np.broadcast_to(rotations.identity(), (frames, len(JOINTS), 4))
     zeros = np.zeros((frames, len(JOINTS), 3))
-    return base.Seen(local, zeros[:, 0], known, has, ("", ""), zeros[0], zeros, zeros[..., 0] > 0)
+    return base.Seen(
+        local, zeros[:, 0], known, has, ("", ""), zeros[0], zeros, zeros[..., 0] > 0, zeros[:, 0] * np.nan
+    )
 
 
 @pytest.mark.parametrize("lacks", ["", "Spine1"])
@@ -131,6 +133,25 @@ def test_the_further_a_forecast_goes_the_more_it_is_expected_to_be_off(backwards
     np.testing.assert_allclose(wrong[:40], seen)
     assert (np.diff(wrong) > 0).all()
     assert wrong[-1] == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def errand(cmu_walk):  # type: ignore[no-untyped-def]
+    """Somebody stands for a second, and six seconds later six metres further on."""
+    way = cmu_walk.root[150] - cmu_walk.root[90]
+    clip = cmu_walk.take(np.repeat(90, 240))
+    translation = clip.translation.copy()
+    translation[210:, 0] += 6.0 * way / np.linalg.norm(way) * [1.0, 0.0, 1.0]
+    return clip.with_motion(clip.rotation, translation)
+
+
+@pytest.mark.parametrize("lone", [False, True])
+def test_who_stands_sets_off_at_once_for_where_he_is_to_be(errand, lone):
+    """And does not wait there until he has to run."""
+    clip, gap = (errand.slice(29, 211), (1, 181)) if lone else (errand, (30, 210))
+    done = interpose.fill(clip, gap, method="small")
+    way = np.linalg.norm((done.clip.root[15:] - done.clip.root[:-15])[gap[0] : gap[1] - 15, ::2], axis=1)
+    assert way.max() < 1.6 * way.mean(), way
 
 
 @pytest.mark.parametrize("first", [False, True])

@@ -23,7 +23,8 @@ from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance
 from interpose.methods.classical import Linear, Spline, ZeroVelocity
 from interpose.methods.protocol import Method, Raw
-from interpose.observation import Gap, Observation, Pin
+from interpose.observation import ROUGH, Gap, Observation, Pin
+from interpose.skeletons.carrier import hips_of
 
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
@@ -128,12 +129,27 @@ def _aimed(parts: np.ndarray, clip: Clip, hidden: Clip, observation: Observation
 def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation, ask: Ask) -> Completion:
     """Complete a clip, lead the hips along the path, and make the result usable once more."""
     known = certain(clip, observation)
-    gaps = spans(clip, known, path)
-    body = _complete(clip, observation, ask, None)
-    led = body.clip
-    for start, stop in gaps:
-        if points := {frame: point for frame, point in path.items() if start <= frame < stop}:
-            led = follow(led, start, stop, points)
+    through = {
+        gap: points
+        for gap in spans(clip, known, path)
+        if (points := {frame: point for frame, point in path.items() if gap[0] <= frame < gap[1]})
+    }
+
+    def follows(done: Completion) -> Clip:
+        led = done.clip
+        for gap, points in through.items():
+            led = follow(led, *gap, points)
+        return led
+
+    unled = _complete(clip, observation, ask, None)
+    # A network that is told of the way takes steps for it, and turns along.
+    hips = hips_of(clip.skeleton)
+    way = follows(unled).positions()[:, hips]
+    frames = np.concatenate([np.arange(start - 1, stop + 1) for start, stop in through])
+    roughly = Pin(clip.skeleton.names[hips], frames, way[frames], tolerance=ROUGH)
+    told = _Told(ask.method.name, ask.method, (roughly,))
+    body = _complete(clip, observation, replace(ask, method=told), None)
+    led = follows(body)
     nothing = np.zeros_like(known.rotation)
     # Who goes there anyway stands as firmly as before.
     same = bool(np.abs(led.positions() - body.clip.positions()).max() < UNMOVED)
@@ -177,7 +193,8 @@ class _Told:
         return self.method.refuses(clip, gap)
 
     def complete(self, clip: Clip, observation: Observation, seed: int | None = None) -> Raw:
-        return self.method.complete(clip, replace(observation, pins=self.pins), seed)
+        pins = (*observation.pins, *self.pins)
+        return self.method.complete(clip, replace(observation, pins=pins), seed)
 
 
 def _slides(done: Completion) -> float:

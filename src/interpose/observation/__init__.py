@@ -1,6 +1,6 @@
 """What is missing: finding it (scan), saying it (Observation, Gap, Pin), making it (corruption)."""
 
-from interpose.observation.observation import Gap, Observation, Pin
+from interpose.observation.observation import ROUGH, Gap, Observation, Pin
 from interpose.observation.part import Part
 
-__all__ = ["Gap", "Observation", "Part", "Pin"]
+__all__ = ["ROUGH", "Gap", "Observation", "Part", "Pin"]

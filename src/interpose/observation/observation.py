@@ -12,6 +12,9 @@ import numpy as np
 from interpose.clip import Clip, Skeleton, joint_numbers
 from interpose.errors import RequestError, is_number, unfit
 
+# Metres by which a pin may be missed from which on it says roughly where the body goes, and no more.
+ROUGH = 0.1
+
 
 def frame_number(value: object) -> int:
     """A frame as a whole number, whatever kind of number says it; RequestError where it is none."""
