@@ -13,6 +13,7 @@ from interpose.methods import registry
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
+from interpose.skeletons.humanoid import reflect
 
 ARM, LEG = ("LeftArm", "LeftForeArm"), ("LeftUpLeg", "LeftLeg")
 
@@ -150,3 +151,42 @@ def test_a_pose_that_glides_below_a_root_that_stays_is_no_life(cmu_walk):
     placed = np.concatenate([np.zeros((len(still), 1, 3)), cmu_walk.translation[:, :1]], axis=1)
     clip = Clip(rig, turned, placed, 30.0, translated=(0, 1))
     assert notes.liveliness(clip, Gap(75, 135)) < 1e-9
+
+
+@pytest.mark.parametrize("lone", [True, False])
+def test_who_waits_and_then_hurries_needs_no_more_frames(cmu_walk, lone):
+    """Two thirds of the gap at a stand and then at 4.4 m/s: it takes 1.4 all the way, which is no hurry."""
+    gap = Gap(1, 91) if lone else Gap(60, 150)
+    count = 92 if lone else 210
+    speed = np.zeros(count)
+    speed[gap.start + 60 : gap.stop] = 4.4
+    course = facing(find_humanoid(cmu_walk).positions(cmu_walk.slice(40, 41))[0])
+    translation = np.repeat(cmu_walk.translation[[40]], count, axis=0)
+    translation[:, 0] += np.cumsum(speed)[:, None] / 30 * [np.sin(course), 0.0, np.cos(course)]
+    clip = cmu_walk.with_motion(np.repeat(cmu_walk.rotation[[40]], count, axis=0), translation)
+    (said,) = notes.hasty(clip, Observation.from_gaps(clip, [gap]), gap, 0)
+    assert "hurries" in said
+    assert "would not" not in said
+    assert "1.4 m/s to get there evenly" in said
+
+
+@pytest.mark.parametrize("pace", [1.2, -2.0])
+def test_what_is_said_of_a_mirror_image_is_the_same(cmu_walk, pace):
+    course = facing(find_humanoid(cmu_walk).positions(cmu_walk.slice(40, 41))[0])
+    # Nearly half a turn while it goes, so that facing matters.
+    turn = rotations.about("Y", np.linspace(0.0, 4.0, 180))
+    rotation = np.repeat(cmu_walk.rotation[[40]], 180, axis=0)
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    translation = np.repeat(cmu_walk.translation[[40]], 180, axis=0)
+    heading = course + np.linspace(0.0, 4.0, 180)
+    way = np.stack([np.sin(heading), 0 * heading, np.cos(heading)], axis=1)
+    speed = np.where((np.arange(180) >= 60) & (np.arange(180) < 120), pace, 1.2)
+    translation[:, 0] += np.cumsum(speed[:, None] * way, axis=0) / 30
+    clip, gap = cmu_walk.with_motion(rotation, translation), Gap(10, 170)
+    both = []
+    for one in (clip, reflect(clip)):
+        known = Observation.from_gaps(one, [gap])
+        both.append([*notes.hasty(one, known, gap, 0), *notes.whirling(one, known, gap, 0)])
+    assert both[0] == both[1]
+    assert any("to the left" in note for note in both[0])
+    assert any("backwards" in note for note in both[0]) == (pace < 0)

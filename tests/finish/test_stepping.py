@@ -15,6 +15,7 @@ from interpose.methods.classical import Linear
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
 from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.humanoid import reflect
 
 
 @pytest.fixture(scope="module")
@@ -105,6 +106,14 @@ def test_turned_and_moved_keys_give_the_same_steps(standing):
     done, steps = filled(clip.with_motion(rotation, translation), known)
     assert steps
     assert np.allclose(done.positions(), rotations.rotate(turn, reference) + shift, atol=1e-6)
+
+
+def test_the_mirror_image_steps_with_the_same_foot(standing):
+    """Left-handed axes are those of the mirror image, in which left is still left."""
+    clip, known = keys(standing, 45, 120)
+    (one, steps), (other, _) = filled(clip, known), filled(reflect(clip), known)
+    assert steps
+    assert np.abs(other.positions() * [-1.0, 1.0, 1.0] - one.positions()).max() < 1e-6
 
 
 def test_hips_sink_for_straight_legs_alone(standing):

@@ -11,6 +11,7 @@ import interpose
 from interpose.geometry import measures, rotations
 from interpose.observation import Gap, Observation, Part
 from interpose.observation.part import lay
+from interpose.skeletons.humanoid import reflect
 
 ARM = ("RightArm", "RightForeArm", "RightHand")
 
@@ -147,3 +148,19 @@ def test_a_body_stands_anew_on_a_leg_that_is_laid_on_it(cmu_walk, data):
     reports = interpose.fill(cmu_walk, (60, 100), method="small", parts=part).report.gaps
     assert max(gap.foot_slide or 0.0 for gap in reports) < 32
     assert not any("slide" in note for gap in reports for note in gap.notes)
+
+
+def test_a_part_of_a_mirror_image_points_as_its_original_does(cmu_walk):
+    """Left-handed axes are those of the mirror image: there bodies turn the other way."""
+    turn = rotations.about("Y", np.array(1.2))
+    rotation = cmu_walk.rotation.copy()
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    other = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    arm = ("LeftArm", "LeftForeArm", "LeftHand")
+
+    def laid(clip, other):  # type: ignore[no-untyped-def]
+        part = Part(other, 100, 130, 60, arm)
+        return interpose.fill(clip, [Gap(55, 95, arm)], method="spline", parts=[part]).clip.positions()
+
+    there = laid(reflect(cmu_walk), reflect(other)) * [-1.0, 1.0, 1.0]
+    assert np.abs(there - laid(cmu_walk, other)).max() < 1e-6

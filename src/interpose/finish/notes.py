@@ -199,7 +199,7 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
     way = np.gradient(placed[:, 0], axis=0)[:, [0, 2]] * fps / size
     way = ndimage.gaussian_filter1d(way, EVEN * fps, axis=0, mode="nearest")
     pace = np.linalg.norm(way, axis=1)
-    course = facing(placed) * body.hand[0]
+    course = facing(placed)
     ahead = way[:, 0] * np.sin(course) + way[:, 1] * np.cos(course)
     back = np.where(ahead < -BACKWARDS * pace, pace, 0.0)
     inside = slice(gap.start - lo, gap.stop - lo)
@@ -214,20 +214,27 @@ def hasty(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]
             f"flagged: it goes backwards at up to {back[frame] * size:.1f} m/s (frame {first + lo + frame})"
         )
         return [said + _helps(finished, gap, ": more frames, or a key in which it has turned, help")]
-    fastest, usual = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
+    fastest, seen_pace = float(pace[inside].max()), float(pace[seen].max(initial=0.0))
     ends = gap.start == 0 or gap.stop == len(finished)
     if ends and (own := np.delete(placed[:, 0], np.r_[inside], axis=0)).shape[0] > 1:
         # What goes on at an end of the clip does so at the pace of the frames beside it.
         alone = ndimage.gaussian_filter1d(
             np.gradient(own, axis=0)[:, [0, 2]] * fps / size, EVEN * fps, axis=0, mode="nearest"
         )
-        usual = float(np.linalg.norm(alone, axis=1).max())
-    if seen.sum() >= fps / 2 and fastest > HURRIES * max(usual, SLOW):
-        frames = math.ceil(len(gap) * fastest / max(usual, SLOW))
-        longer = "" if ends else f". With about {frames} frames it would not"
-        paces = f"{fastest * size:.1f} m/s, where the motion around it goes at {usual * size:.1f}"
-        return [f"flagged: it hurries: up to {paces}{longer}"]
-    return []
+        seen_pace = float(np.linalg.norm(alone, axis=1).max())
+    mean = float(pace[inside].mean())
+    told = seen.sum() >= fps / 2  # else keys are alone, and nobody goes around them
+    usual = max(seen_pace if told else mean, SLOW)
+    if fastest <= HURRIES * usual:
+        return []
+    said = f"flagged: it hurries: up to {fastest * size:.1f} m/s"
+    said += f", where the motion around it goes at {seen_pace * size:.1f}" if told else ""
+    if ends:
+        return [said]
+    if mean > HURRIES * usual / 2:
+        return [f"{said}. With about {math.ceil(len(gap) * mean / usual)} frames it would not"]
+    evenly = f", though it would take {mean * size:.1f} m/s to get there evenly"
+    return [said + evenly + _helps(finished, gap, ". A key on its way says where it is by then")]
 
 
 def whirling(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
@@ -251,7 +258,8 @@ def whirling(finished: Clip, known: Observation, gap: Gap, first: int) -> list[s
     # Half a turn is as far to the one side as to the other.
     if abs(way - short) < 180 or abs(abs(way) - abs(short)) < ROUND:
         return []
-    said = f"flagged: it turns by {abs(way):.0f} degrees to the {'left' if way > 0 else 'right'}"
+    left = way * find_humanoid(part).hand[0] > 0 if find_mapping(part.skeleton).usable else way > 0
+    said = f"flagged: it turns by {abs(way):.0f} degrees to the {'left' if left else 'right'}"
     other = "" if way * short > 0 else " the other way"
     return [
         f"{said}, where the poses beside the gap are {abs(short):.0f} apart{other}: a key in between says "

@@ -26,7 +26,7 @@ from interpose.geometry import measures, rotations
 from interpose.geometry.ground import FLOOR
 from interpose.geometry.time import ease
 from interpose.observation import Observation
-from interpose.skeletons import find_mapping
+from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.carrier import hips_of, moved, place_of
 
 # Metres that the middle of the feet goes at most, of who stays where he is, and that a foot has to go, or the
@@ -190,7 +190,7 @@ def _steps(turn: Turn, clip: Clip, span: tuple[int, int]) -> np.ndarray | None:
     if slot < QUICK * fps:
         return None
     takes = min(slot, SLOW * fps)
-    first = int(turn.angle < 0)
+    first = int(turn.angle * find_humanoid(clip).hand[0] < 0)
     middles = (np.arange(2 * rounds) + 0.5) * slot
     if rounds == 1:
         own = _half_way(turn, clip, span)

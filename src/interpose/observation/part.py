@@ -102,7 +102,9 @@ def _ahead(clip: Clip) -> np.ndarray:
     about the vertical, too. (The line of the hips flips where a body rolls over.)
     """
     if find_mapping(clip.skeleton).usable:
-        turned = find_humanoid(clip).rotations(clip)[:, 0]
+        body = find_humanoid(clip)
+        # The file's own turns may be those of the mirror image.
+        turned = body.rotations(clip)[:, 0] * [1.0, 1.0, body.hand[0], body.hand[0]]
     else:
         turned = clip.kinematics()[0][:, hips_of(clip.skeleton)]
     return rotations.twist_about(turned, UP.values)
