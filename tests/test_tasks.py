@@ -27,7 +27,7 @@ from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
 from interpose.methods import base, registry, weights
 from interpose.observation import Gap, Observation, Pin, timeline
-from interpose.observation.scan import intact
+from interpose.observation.scan import intact, scan
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 from interpose.tasks import filling, stitching, windows
@@ -794,21 +794,72 @@ def test_why_no_network_fills_a_gap_is_said_of_what_is_no_humanoid(cmu_walk):
     assert any(note.startswith("not filled by base") for note in gap.notes)
 
 
-def test_another_body_in_the_same_file_is_said_to_be_interpolated(cmu_walk):
+@pytest.fixture(scope="module")
+def duo(cmu_walk):  # type: ignore[no-untyped-def]
+    """Two bodies in one file: one who walks, and two metres beside him the same walk backwards."""
     skeleton, count = cmu_walk.skeleton, len(cmu_walk.skeleton)
     both = Skeleton(
         (*skeleton.names, *(f"B_{name}" for name in skeleton.names)),
         (*skeleton.parents, *(parent + count if parent >= 0 else -1 for parent in skeleton.parents)),
         np.tile(skeleton.rest_translation, (2, 1)),
     )
-    places = np.concatenate([cmu_walk.translation, cmu_walk.translation + np.array([2.0, 0, 0])], axis=1)
-    duo = Clip(both, np.tile(cmu_walk.rotation, (1, 2, 1)), places, cmu_walk.fps)
-    (gap,) = tasks.fill(duo, [Gap(60, 90)], "small").report.gaps
-    assert (
-        gap.notes[0] == "the 31 joints of B_Hips are another body, and interpolated: --root B_Hips fills it"
+    places = np.concatenate(
+        [cmu_walk.translation, cmu_walk.translation[::-1] + np.array([2.0, 0, 0])], axis=1
     )
-    (gap,) = tasks.fill(cmu_walk, [Gap(60, 90)], "small").report.gaps
-    assert not any("another body" in note for note in gap.notes)
+    return Clip(
+        both, np.concatenate([cmu_walk.rotation, cmu_walk.rotation[::-1]], axis=1), places, cmu_walk.fps
+    )
+
+
+def test_each_of_two_bodies_is_filled_as_if_it_were_alone(duo, cmu_walk):
+    """And the reports say whose gap it is."""
+    count, back = len(cmu_walk.skeleton), cmu_walk.take(np.arange(len(cmu_walk))[::-1])
+    done = tasks.fill(duo, [Gap(60, 90)], "small")
+    one, other = done.report.gaps
+    assert one.joints == duo.skeleton.names[:count]
+    assert other.joints == duo.skeleton.names[count:]
+    for joints, alone in ((slice(count), cmu_walk), (slice(count, None), back)):
+        there = tasks.fill(alone, [Gap(60, 90)], "small").clip
+        np.testing.assert_allclose(done.clip.rotation[:, joints], there.rotation, atol=1e-9)
+
+
+def test_of_two_bodies_one_can_be_lost(duo, cmu_walk):
+    """All joints that are its, or the one that is said to be meant: the other one stays as it is."""
+    count = len(cmu_walk.skeleton)
+    own = duo.skeleton.names[count:]
+    meant = replace(duo, skeleton=replace(duo.skeleton, roles={"root": "B_Hips"}), source=None)
+    named = tasks.fill(duo, [Gap(60, 90, own)], "small")
+    said = tasks.fill(meant, [Gap(60, 90)], "small")
+    np.testing.assert_array_equal(named.clip.rotation, said.clip.rotation)
+    np.testing.assert_array_equal(named.clip.translation, said.clip.translation)
+    assert np.array_equal(named.clip.rotation[:, :count], duo.rotation[:, :count])
+    assert np.array_equal(named.clip.translation[:, 0], duo.translation[:, 0])
+    assert not np.array_equal(named.clip.translation[60:90, 1], duo.translation[60:90, 1])
+
+
+def test_what_two_bodies_lack_is_found_and_recovered_of_each(duo, cmu_walk):
+    """A body that is held for a second, and an arm of the other one that drops to rest meanwhile."""
+    count = len(cmu_walk.skeleton)
+    rotation, translation = duo.rotation.copy(), duo.translation.copy()
+    rotation[60:90, count:], translation[60:90, 1] = rotation[59, count:], translation[59, 1]
+    arm = duo.skeleton.index("LeftArm")
+    rotation[120:123, arm] = duo.skeleton.rest_rotation[arm]
+    damaged = duo.with_motion(rotation, translation)
+    found = scan(damaged)
+    assert [(one.kind, one.start, one.stop) for one in found] == [("frozen", 60, 90), ("lost", 120, 123)]
+    assert found[0].joints == duo.skeleton.names[count:]
+    assert found[1].joints == ("LeftArm",)
+    mended = tasks.recover(damaged, method="small")
+    assert np.array_equal(mended.clip.rotation[:, count:], rotation[:, count:])
+    assert rotations.angle(mended.clip.rotation[120:123, arm], duo.rotation[120:123, arm]).max() < 0.1
+
+
+def test_a_path_is_the_way_of_one_body(duo):
+    aside = duo.translation[75, 0, [0, 2]] + 0.3
+    done = tasks.fill(duo, [Gap(60, 90)], "small", path={75: aside})
+    np.testing.assert_allclose(done.clip.translation[75, 0, [0, 2]], aside, atol=1e-6)
+    there = tasks.fill(duo, [Gap(60, 90)], "small").clip
+    np.testing.assert_array_equal(done.clip.translation[:, 1], there.translation[:, 1])
 
 
 def test_a_root_that_stays_does_so_where_a_pose_of_another_body_is_met(cmu_walk):

@@ -80,7 +80,7 @@ def test_what_is_stuck_once_the_rest_moves_is_told_of(run, take, monkeypatch):
 
 
 def test_another_body_is_said_to_be_one(run, take):
-    """Whose limbs nothing is looked for in."""
+    """And each is looked at."""
     clip = load(take)
     old = clip.skeleton
     count = len(old)
@@ -91,5 +91,7 @@ def test_another_body_is_said_to_be_one(run, take):
         both, np.tile(clip.rotation, (1, 2, 1)), np.tile(clip.translation, (1, 2, 1)), clip.fps, (0, count)
     )
     save(two, take.with_name("two.bvh"))
-    assert f"the {count} joints of B_{old.names[0]} are another body" in run("scan", "two.bvh").out
-    assert "another body" not in run("scan", take.name).out
+    assert f"2 bodies, each by itself: {old.names[0]}, B_{old.names[0]}" in run("scan", "two.bvh").out
+    assert "bodies" not in run("scan", take.name).out
+    alone = run("scan", "two.bvh", "--root", f"B_{old.names[0]}").out
+    assert f"that of B_{old.names[0]} alone is looked at" in alone

@@ -36,11 +36,13 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         more: further ones: each is done by itself.
         json: print JSON for other programs.
     """
+    from interpose.errors import few
     from interpose.finish.feet import legs
     from interpose.finish.notes import bodies
     from interpose.observation.finding import to_gaps
     from interpose.observation.scan import OR, scan, stays
     from interpose.skeletons.carrier import line_of
+    from interpose.skeletons.performers import clip_of, meant
 
     clip = reading.load(file)
     made = _made(file, clip)
@@ -62,10 +64,14 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say_json({"input": str(file), **details(clip), "findings": findings, "filled": _frames(made)})
         return
     say("\n".join(describe(file, clip)))
+    tops = [clip.skeleton.names[joints[0]] for joints in meant(clip.skeleton)]
+    if len(tops) > 1:
+        what = f"{len(tops)} bodies, each by itself: {few(tops)}"
+        say(f"{what}. --root {quote(tops[-1])} means one of them, here and in other verbs")
+    elif tops:
+        say(f"of several bodies that of {tops[0]} alone is looked at, as --root says")
     for name, count in bodies(clip.skeleton).items():
-        say(
-            f"the {count} joints of {name} are another body: --root {quote(name)} looks for its limbs' faults"
-        )
+        say(f"the {count} joints of {name} are another body, which no network knows")
     if made:
         say(f"filled by interpose, as the report beside it says: {', '.join(_frames(made))}")
     where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."
@@ -139,7 +145,8 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             say(f"interpose stitch {halves} --frames 2 {says}")
     if any(one.kind == "frozen body" for one in found):
         say(f"interpose recover {quote(str(file))} restores a held body, its place and turns at once.")
-    body = {(clip.skeleton.names[joint],) for joint in line_of(clip)}
+    each_of = [clip_of(clip, joints) for joints in meant(clip.skeleton)] or [clip]
+    body = {(one.skeleton.names[joint],) for one in each_of for joint in line_of(one)}
     stands = [one for one in found if one.kind == "frozen position"]
     if any(one.joints in body for one in stands) and legs(clip.skeleton):
         say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from interpose.methods.classical import Linear, Spline, ZeroVelocity
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import ROUGH, Gap, Observation, Pin
 from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.performers import Joints, clip_of, performers, with_clips
 
 # Metres from where it would be at which a pinned joint is asked about.
 FAR = 1.5
@@ -52,7 +53,7 @@ def complete(
     path: Mapping[int, np.ndarray] | None = None,
     first: int = 0,
 ) -> Completion:
-    """Complete a clip by a method, and make the result usable.
+    """Complete a clip by a method, and make the result usable; of several bodies each as if it were alone.
 
     Observed values come back bit for bit, bones keep their lengths, there is no pop at seams, planted feet
     stay planted, and what is unobserved in `clip` has no influence on anything. Gaps that the method refuses,
@@ -75,7 +76,60 @@ def complete(
             point of the path lies in no gap of the whole pose with known frames on both sides.
     """
     observation.check(clip)
-    return _complete(clip, observation, Ask(method, seed, fallback or Spline(), limits, still, first), path)
+    ask = Ask(method, seed, fallback or Spline(), limits, still, first)
+    if several := performers(clip.skeleton):
+        return _each(several, clip, observation, ask, path)
+    return _complete(clip, observation, ask, path)
+
+
+def _each(
+    several: tuple[Joints, ...],
+    clip: Clip,
+    observation: Observation,
+    ask: Ask,
+    path: Mapping[int, np.ndarray] | None,
+) -> Completion:
+    """Complete the bodies of a clip one by one, as if each were alone; a path is the first one's."""
+    done: dict[Joints, Completion] = {}
+    for joints in several:
+        part, own = clip_of(clip, joints), list(joints)
+        pins = tuple(pin for pin in observation.pins if pin.joint in part.skeleton.names)
+        seen = Observation(observation.rotation[:, own], observation.translation[:, own], pins)
+        if seen.complete and not pins:
+            continue
+        limits, still = (None if some is None else some[own] for some in (ask.limits, ask.still))
+        done[joints] = _complete(part, seen, replace(ask, limits=limits, still=still), path)
+        path = None
+    return assembled(clip, done) if done else _complete(clip, observation, ask, path)
+
+
+def assembled(clip: Clip, done: Mapping[Joints, Completion]) -> Completion:
+    """A clip with the completions of some of its bodies, by the joints of each."""
+    main = next(iter(done.values()))
+    codes = np.full(clip.rotation.shape[:2], Provenance.OBSERVED, np.int8)
+    gaps: list[GapReport] = []
+    for joints, one in done.items():
+        codes[:, list(joints)] = one.provenance
+        # Of the one that was said to be meant a whole pose is all there is.
+        names = None if "root" in clip.skeleton.roles else one.clip.skeleton.names
+        gaps += [gap if gap.joints else replace(gap, joints=names) for gap in one.report.gaps]
+    gaps.sort(key=attrgetter("start"))
+    reports = [one.report for one in done.values()]
+    report = replace(
+        main.report,
+        gaps=gaps,
+        moments=tuple(told for one in reports for told in one.moments),
+        exchanged=tuple(told for one in reports for told in one.exchanged),
+        unpaired=tuple(name for one in reports for name in one.unpaired),
+    )
+
+    def said() -> Raw:
+        spoken = {joints: one.raw.clip for joints, one in done.items()}
+        return replace(main.raw, clip=with_clips(clip, spoken), positions=None, joints=(), own=None)
+
+    return Completion(
+        with_clips(clip, {joints: one.clip for joints, one in done.items()}), said, codes, report
+    )
 
 
 def _complete(

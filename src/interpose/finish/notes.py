@@ -19,6 +19,7 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
+from interpose.skeletons.performers import performers
 
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
 # pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
@@ -93,17 +94,18 @@ def sized(skeleton: Skeleton) -> list[str]:
 
 
 def others(skeleton: Skeleton, gap: Gap) -> list[str]:
-    """Notes where a gap is one of more bodies than the one that networks fill."""
+    """Notes where a gap is one of a body, too, that networks do not fill."""
     return [
-        f"the {count} joints of {name} are another body, and interpolated: --root {name} fills it"
+        f"the {count} joints of {name} are another body, which no network knows, and interpolated"
         for name, count in (bodies(skeleton).items() if gap.joints is None else ())
     ]
 
 
 def bodies(skeleton: Skeleton) -> dict[str, int]:
-    """The other bodies of a file, beside the humanoid that is looked at: their roots, and how many joints."""
+    """What else has many joints in a file, and is no humanoid: by its roots, how many joints."""
     mapping = find_mapping(skeleton)
     mine = {skeleton.ancestors(joint)[-1] for joint in mapping.mapped[1] if skeleton.ancestors(joint)}
+    mine.update(joint for joints in performers(skeleton)[1:] for joint in joints)
     counts = {root: int(skeleton.below[:, root].sum()) for root in skeleton.roots if root not in mine}
     return {skeleton.names[root]: n for root, n in counts.items() if n >= BODY and mapping.usable}
 

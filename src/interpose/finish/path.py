@@ -18,7 +18,7 @@ from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
-from interpose.skeletons.carrier import carriers, hips_of, moved
+from interpose.skeletons.carrier import STILL, carriers, hips_of, moved
 
 # Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.
 SLOW = 0.25
@@ -86,12 +86,19 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
                 rotations.multiply(turn[1:-1], turned[:, joint]),
                 hips + shift[1:-1, [0, 0, 1]] * FLOOR + rotations.rotate(turn[1:-1], placed[:, joint] - hips),
             )
-            for joint in carriers(clip)
+            for joint in _led(clip)
         },
     )
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     rotation[start:stop], translation[start:stop] = led.rotation, led.translation
     return clip.with_motion(rotation, translation)
+
+
+def _led(clip: Clip) -> list[int]:
+    """What a path leads: the body, and targets of its feet and hands, but no chair that keeps its place."""
+    top, *others = carriers(clip)
+    ways = {joint: clip.translation[:, clip.translated.index(joint)] for joint in others}
+    return [top, *(joint for joint, way in ways.items() if np.ptp(way, axis=0).max() > STILL)]
 
 
 def _turns(old: np.ndarray, new: np.ndarray, near: np.ndarray, fps: float) -> np.ndarray:

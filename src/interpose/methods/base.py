@@ -27,6 +27,7 @@ from interpose.methods.protocol import Raw
 from interpose.observation import ROUGH, Gap, Observation, Pin
 from interpose.skeletons import ACROSS, ACROSS_TURN, FEET, JOINTS, PARENTS, SIDES, Mapping, find_mapping
 from interpose.skeletons.mirror import mirrored
+from interpose.skeletons.performers import by_itself, performers
 
 FEET_ACROSS = [FEET.index(SIDES[foot]) for foot in FEET]
 AGREE = np.pi / 2  # how far a motion and its mirror image may be apart, in any joint
@@ -132,7 +133,11 @@ class Base:
         if reason := no_humanoid(mapping):
             return reason
         if gap.joints is not None:
-            known = {clip.skeleton.names[joint] for joint in mapping.mapped[1]}
+            bodies = [
+                clip.skeleton,
+                *(by_itself(clip.skeleton, one) for one in performers(clip.skeleton)[1:]),
+            ]
+            known = {body.names[joint] for body in bodies for joint in find_mapping(body).mapped[1]}
             return None if known & {*gap.joints} else "it knows none of these joints"
         return None
 

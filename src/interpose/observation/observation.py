@@ -11,6 +11,7 @@ import numpy as np
 
 from interpose.clip import Clip, Skeleton, joint_numbers
 from interpose.errors import RequestError, is_number, unfit
+from interpose.skeletons.performers import meant
 
 # Metres by which a pin may be missed from which on it says roughly where the body goes, and no more.
 ROUGH = 0.1
@@ -234,8 +235,13 @@ class Observation:
 
     @classmethod
     def from_gaps(cls, clip: Clip, gaps: Iterable[Gap]) -> Observation:
-        """Everything is known but the gaps. Raises RequestError for ranges or joints that are not there."""
-        seen = cls.full(clip)
+        """Everything is known but the gaps. Raises RequestError for ranges or joints that are not there.
+
+        Where a file has several bodies, and somebody said which one is meant (`roles["root"]`), a gap of the
+        whole pose is that body's; and one that names all joints of a body is of its place, too.
+        """
+        seen, several = cls.full(clip), meant(clip.skeleton)
+        bodies = several or [range(len(clip.skeleton))]
         if not isinstance(gaps, Iterable) or isinstance(gaps, str):
             raise unfit("gaps", gaps, 'a list of Gaps, such as [Gap.parse("120:160")]')
         for gap in gaps:
@@ -243,12 +249,12 @@ class Observation:
                 raise unfit("gap", gap, 'a Gap, such as Gap.parse("120:160")')
             gap.check(len(clip))
             frames = slice(gap.start, gap.stop)
-            if gap.joints is None:
-                seen.rotation[frames] = False
-                seen.translation[frames, list(clip.translated)] = False
-            else:
-                for name in gap.joints:
-                    seen.rotation[frames, clip.skeleton.index(name)] = False
+            lost = {clip.skeleton.index(name) for name in gap.joints or ()}
+            seen.rotation[frames, [*lost]] = False
+            for body in bodies:
+                if gap.joints is None or (several and lost.issuperset(body)):
+                    seen.rotation[frames, list(body)] = False
+                    seen.translation[frames, [*{*body} & {*clip.translated}]] = False
         return seen
 
     @classmethod

@@ -3,6 +3,7 @@ drop out."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -22,6 +23,7 @@ from interpose.observation.stiff import TELEPORTS, TIMES
 from interpose.observation.tremor import FEWEST, NOISY, body_of, bursts, deviation, restless
 from interpose.skeletons.carrier import STILL as UNMOVED
 from interpose.skeletons.carrier import hips_of, placed
+from interpose.skeletons.performers import Joints, by_itself, clip_of, meant
 
 OR = "or in all other frames"  # where limbs change sides once, nobody knows which side of it is wrong
 TOLD = 1 / 3  # of the frames in which a joint trembles: found otherwise, it is that
@@ -69,17 +71,44 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     - "noisy": frames in which the body, or a joint by itself, trembles by more than recorded motion does:
       what `denoise` smooths.
 
+    Of several bodies each is looked at as if it were alone, or the one that somebody said is meant
+    (`roles["root"]`).
+
     Joints that never move are "frozen" where those of the other side do. Else they are not reported, nor are
     those that stand still for half of the clip at a stretch, or for nine tenths of it in all: they have no
     data to be filled from.
     """
     known = observation or Observation.full(clip)
     known.check(clip)
+    if several := meant(clip.skeleton):
+        return _each(several, clip, known)
     gaps = known.gaps(clip.skeleton)
     findings = [Finding("missing", gap.joints, gap.start, gap.stop, "no values") for gap in gaps]
     if len(clip) > 2:
         findings = _looked_at(clip, known, findings)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
+
+
+def _each(several: Sequence[Joints], clip: Clip, known: Observation) -> list[Finding]:
+    """What is found of each of several bodies by itself, and of all of them at once what each shows."""
+    found = []
+    for joints in several:
+        own = list(joints)
+        seen = Observation(known.rotation[:, own], known.translation[:, own])
+        found.append(scan(clip_of(clip, joints), seen))
+    if len(several) == 1:
+        return found[0]  # of the one that is meant, a whole pose is that one's
+    whole = [{(one.kind, one.start, one.stop) for one in some if one.joints is None} for some in found]
+    every = set.intersection(*whole)
+    told = [one for one in found[0] if one.joints is None and (one.kind, one.start, one.stop) in every]
+    for joints, some in zip(several, found):
+        names = by_itself(clip.skeleton, joints).names
+        told += [
+            one if one.joints else replace(one, joints=names)
+            for one in some
+            if one.joints or (one.kind, one.start, one.stop) not in every
+        ]
+    return sorted(told, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
 def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:

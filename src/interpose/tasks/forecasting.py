@@ -105,7 +105,7 @@ def forecast(
     done = []
     for i, drawn in enumerate(seeds):
         one = fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
-        (told,) = one.report.gaps
+        told = one.report.gaps[0]
         if samples > 1 and told.method != one.report.method:
             raise RequestError(
                 f"cannot draw {samples} samples",

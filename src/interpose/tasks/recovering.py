@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.finish import Completion, Provenance
+from interpose.finish.completing import assembled
 from interpose.finish.feet import legs
 from interpose.finish.report import JointMoments
 from interpose.geometry import rotations
@@ -20,6 +22,7 @@ from interpose.observation.exchange import Bend, Exchange, Taken, crossovers, ex
 from interpose.observation.frozen import held_values, stuck
 from interpose.observation.scan import intact, strays
 from interpose.skeletons.carrier import STILL, line_of, place_of
+from interpose.skeletons.performers import Joints, clip_of, meant
 from interpose.tasks.filling import fill
 
 # The share that is lost, of joints that turn at all, from which on what is at rest beside them is lost as
@@ -75,12 +78,22 @@ def recover(
             # The first frame counts that belongs to the motion.
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
+    if joints is None and (several := meant(clip.skeleton)):
+        bodies: dict[Joints, Completion] = {}
+        for i, body in enumerate(several):
+            along = None if progress is None else partial(_along, progress, i, len(several))
+            bodies[body] = recover(clip_of(clip, body), None, (start, stop), method, seed, along)
+        return assembled(clip, bodies)
     if joints is None:
         swapped = swaps(clip, start, stop)
         sides = put_back(clip, swapped)
         done = fill(sides, _by_itself(sides, start, stop), method, seed=seed, progress=progress)
         return with_sides(done, swapped)
     return fill(clip, [Gap(start, stop, tuple(joints))], method, seed=seed, progress=progress)
+
+
+def _along(progress: Callable[[float], None], done: int, of: int, share: float) -> None:
+    progress((done + share) / of)
 
 
 def swaps(clip: Clip, start: int, stop: int) -> list[Taken]:

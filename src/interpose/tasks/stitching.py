@@ -151,7 +151,7 @@ def cycle(clip: Clip) -> Cycle:
             one = Cycle(begin, end - bridge, bridge, apart)
             kept = clip.slice(one.start, one.stop)
             done = stitch([kept], one.frames, loop=True)
-            (closed,) = done.report.gaps
+            closed = done.report.gaps[0]
             flags, slides = _judged(closed)
             snaps = float((_jumps(done, len(kept))[own] / most).max())
             # Feet are not where the last frame has them, so that also the briefest way back may skid.
@@ -197,7 +197,7 @@ def _tried(
             if (clean and way.in_step and clean[0]) or (length < own and any(clean)):
                 break
             pair = timeline.lay(ends, length)
-            (report,) = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps
+            report = fill(pair.clip, pair.gaps, method, seed=seed, action=action).report.gaps[0]
             flags, slides = _judged(report)
             goes = report.foot_slide is not None and (report.foot_travel or 0.0) >= TRAVELS
             if goes or flags or length == own or judged[own][0]:
