@@ -63,6 +63,12 @@ def test_what_tools_add_makes_no_other_rig(heap):
     assert np.array_equal(known(exported)[1], known(heap)[1])
 
 
+@pytest.mark.parametrize("called", ["Bob_{}", "{}#2", "Bob:{}#2"])
+def test_another_performers_names_are_those_of_the_rig(heap, called):
+    other = replace(heap, names=tuple(called.format(name) for name in heap.names))
+    assert np.array_equal(known(other)[1], known(heap)[1])
+
+
 def test_a_joint_between_the_rigs_own_makes_another_rig(heap):
     arm, elbow = heap.index("RightArm"), heap.index("RightForeArm")
     parents = [parent + (parent >= elbow) for parent in heap.parents]

@@ -17,6 +17,7 @@ from interpose.geometry import kinematics, rotations
 from interpose.skeletons.mapping import Mapping
 
 RIGS = Path(__file__).with_name("rigs.json")
+AGAIN = "#"  # before the number of a name that occurs once more in a file
 LEAST = 0.01  # metres: bones that are shorter have no direction
 LIKE = 0.98  # the cosine by which bones of a zero pose may point elsewhere
 
@@ -43,11 +44,20 @@ def directions(skeleton: Skeleton) -> np.ndarray:
 def known_rest(mapping: Mapping) -> tuple[str, np.ndarray] | None:
     """The name and the T-pose (22, 4) of the rig that a mapped skeleton is, or None for all others.
 
-    Names, what hangs from what, and the zero pose must be those of the rig. A namespace before the names,
-    joints above the hips, and those beside the body (a prop, a tail) make it no other rig.
+    Names, what hangs from what, and the zero pose must be those of the rig. A namespace before the names or
+    what else all begin with, the number of a second body that has the same ones, joints above the hips, and
+    those beside the body (a prop, a tail) make it no other rig.
     """
+    skeleton, found = mapping.skeleton, mapping.mapped[1]
+    called = [skeleton.names[joint].rpartition(":")[2].partition(AGAIN)[0] for joint in found]
+    begin = next((at for at, letters in enumerate(zip(*called)) if len({*letters}) > 1), 0)
+    return _known(mapping, dict(zip(called, found))) or (
+        _known(mapping, dict(zip([name[begin:] for name in called], found))) if begin else None
+    )
+
+
+def _known(mapping: Mapping, joints: dict[str, int]) -> tuple[str, np.ndarray] | None:
     skeleton = mapping.skeleton
-    joints = {skeleton.names[joint].rpartition(":")[2]: joint for joint in mapping.mapped[1]}
     for rig in _rigs():
         its = {name: np.array(way) for name, way in zip(rig["names"], rig["directions"])}
         bones = [name for name, way in its.items() if way.any()]
