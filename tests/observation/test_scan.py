@@ -611,3 +611,27 @@ def test_what_carries_the_body_need_not_turn_to_jump_away_and_back(cmu_walk):
     found = [one for one in scan(walk.with_motion(walk.rotation, translation)) if one.kind != "noisy"]
     assert ("lost", ("root",), 90, 95) in spans(found)
     assert "jump" not in {one.kind for one in found}
+
+
+def with_chair(clip: Clip, place: np.ndarray) -> Clip:
+    """A chair beside the body, at places (F, 3)."""
+    skeleton = clip.skeleton
+    both = Skeleton(
+        (*skeleton.names, "Chair"),
+        (*skeleton.parents, -1),
+        np.append(skeleton.rest_translation, [[0.0] * 3], 0),
+    )
+    still = np.broadcast_to(rotations.identity(), (len(clip), 1, 4))
+    rotation = np.concatenate([clip.rotation, still], axis=1)
+    translation = np.concatenate([clip.translation, place[:, None]], axis=1)
+    return Clip(both, rotation, translation, clip.fps, (*clip.translated, len(skeleton)))
+
+
+def test_a_chair_stands_where_it_was_put_and_where_it_jumps_it_is_the_chair(cmu_walk):
+    time = np.arange(len(cmu_walk))
+    pushed = np.zeros((len(cmu_walk), 3))
+    pushed[:, 0] = 1.0 + 0.3 * (1 - np.cos(np.pi * np.clip((time - 90) / 60, 0, 1)))
+    assert scan(with_chair(cmu_walk, pushed)) == scan(cmu_walk)
+    pushed[120:, 2] += 1.5
+    (found,) = [one for one in scan(with_chair(cmu_walk, pushed)) if one.kind == "jump"]
+    assert found.joints == ("Chair",)

@@ -174,9 +174,11 @@ def _frozen_places(steps: Steps, whole: np.ndarray, walking: np.ndarray, stands:
                 continue
             beside = [*own[max(run.start - 1, 0) : run.start], *own[run.stop : run.stop + 1], 0.0]
             stopped_dead = np.nanmax(beside) * clip.fps > PACE and run.stop - run.start >= steps.shortest
-            if stopped_dead or _suspicious(run, steps, np.nanmean(own) / EXPECTED_WAY):
-                name = clip.skeleton.names[placed(clip)[column]]
-                found.append(steps.finding("frozen position", (name,), run))
+            joint = placed(clip)[column]
+            # What is no body, as a chair, may stand where it was put.
+            pauses = joint not in line_of(clip) and not (run.jumps_in or run.jumps_out)
+            if stopped_dead or (_suspicious(run, steps, np.nanmean(own) / EXPECTED_WAY) and not pauses):
+                found.append(steps.finding("frozen position", (clip.skeleton.names[joint],), run))
     return found
 
 

@@ -277,8 +277,9 @@ def _led_over(clip: Clip, findings: list[Finding]) -> Clip:
 
 def _turning(clip: Clip, joints: list[int]) -> tuple[str, ...]:
     """The names of the joints that jump themselves, where `joints` are elsewhere: what those hang from, of
-    those that hang from none of the others."""
+    those that hang from none of the others; a root by itself."""
     skeleton = clip.skeleton
     top = [joint for joint in joints if not {*skeleton.ancestors(joint)} & {*joints}]
-    turned = dict.fromkeys(max(skeleton.parents[joint], 0) for joint in top)
+    above = ((joint, skeleton.parents[joint]) for joint in top)
+    turned = dict.fromkeys(joint if parent < 0 else parent for joint, parent in above)
     return tuple(skeleton.names[joint] for joint in turned)
