@@ -14,7 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.skeletons.rigs import under_root
+from tests.skeletons.rigs import twice, under_root
 
 from interpose import tasks
 from interpose.clip import Clip, Skeleton
@@ -797,18 +797,11 @@ def test_why_no_network_fills_a_gap_is_said_of_what_is_no_humanoid(cmu_walk):
 @pytest.fixture(scope="module")
 def duo(cmu_walk):  # type: ignore[no-untyped-def]
     """Two bodies in one file: one who walks, and two metres beside him the same walk backwards."""
-    skeleton, count = cmu_walk.skeleton, len(cmu_walk.skeleton)
-    both = Skeleton(
-        (*skeleton.names, *(f"B_{name}" for name in skeleton.names)),
-        (*skeleton.parents, *(parent + count if parent >= 0 else -1 for parent in skeleton.parents)),
-        np.tile(skeleton.rest_translation, (2, 1)),
-    )
-    places = np.concatenate(
-        [cmu_walk.translation, cmu_walk.translation[::-1] + np.array([2.0, 0, 0])], axis=1
-    )
-    return Clip(
-        both, np.concatenate([cmu_walk.rotation, cmu_walk.rotation[::-1]], axis=1), places, cmu_walk.fps
-    )
+    two, count = twice(cmu_walk), len(cmu_walk.skeleton)
+    rotation, translation = two.rotation.copy(), two.translation.copy()
+    rotation[:, count:] = rotation[::-1, count:]
+    translation[:, 1] = translation[::-1, 1] + [2.0, 0.0, 0.0]
+    return two.with_motion(rotation, translation)
 
 
 def test_each_of_two_bodies_is_filled_as_if_it_were_alone(duo, cmu_walk):

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.skeletons.rigs import TARGET, under_root
+from tests.skeletons.rigs import TARGET, twice, under_root
 
 import interpose
 from interpose.formats import load, save
@@ -57,6 +57,14 @@ def test_convert_puts_a_motion_onto_a_rig(run, rigs):
     assert made.fps == pytest.approx(60)
     assert made.seconds == pytest.approx(walk.seconds, abs=0.05)
     assert "JOINT mixamorig:LeftHandIndex4" in (rigs / "mine.bvh").read_text()
+
+
+def test_of_two_bodies_one_is_brought_onto_a_rig_and_it_is_said_which(run, rigs):
+    save(twice(load(rigs / "walk.bvh")), rigs / "two.bvh")
+    first = load(rigs / "walk.bvh").skeleton.names[0]
+    done = run("convert", "two.bvh", "mine.bvh", "--onto", "hands.bvh")
+    assert f"the motion of {first} alone is brought onto it: --root takes B_{first} instead" in done.out
+    assert "alone" not in run("convert", "walk.bvh", "mine2.bvh", "--onto", "hands.bvh").out
 
 
 def test_convert_onto_the_same_rig_keeps_every_rotation(run, rigs, data):

@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
+from tests.skeletons.rigs import twice
 
-from interpose.clip import Clip, Skeleton
 from interpose.formats import load, save
 from interpose.geometry import rotations
 from interpose.observation.finding import Finding
@@ -81,17 +81,9 @@ def test_what_is_stuck_once_the_rest_moves_is_told_of(run, take, monkeypatch):
 
 def test_another_body_is_said_to_be_one(run, take):
     """And each is looked at."""
-    clip = load(take)
-    old = clip.skeleton
-    count = len(old)
-    names = (*old.names, *(f"B_{name}" for name in old.names))
-    parents = (*old.parents, *(parent + count if parent >= 0 else -1 for parent in old.parents))
-    both = Skeleton(names, parents, np.tile(old.rest_translation, (2, 1)))
-    two = Clip(
-        both, np.tile(clip.rotation, (1, 2, 1)), np.tile(clip.translation, (1, 2, 1)), clip.fps, (0, count)
-    )
-    save(two, take.with_name("two.bvh"))
-    assert f"2 bodies, each by itself: {old.names[0]}, B_{old.names[0]}" in run("scan", "two.bvh").out
+    save(twice(load(take)), take.with_name("two.bvh"))
+    first = load(take).skeleton.names[0]
+    assert f"2 bodies, each by itself: {first}, B_{first}" in run("scan", "two.bvh").out
     assert "bodies" not in run("scan", take.name).out
-    alone = run("scan", "two.bvh", "--root", f"B_{old.names[0]}").out
-    assert f"that of B_{old.names[0]} alone is looked at" in alone
+    alone = run("scan", "two.bvh", "--root", f"B_{first}").out
+    assert f"that of B_{first} alone is looked at" in alone

@@ -539,3 +539,16 @@ def six_channels(clip: Clip) -> Clip:
     """The clip with positions of every joint in every frame, as some programs write files."""
     joints = tuple(range(len(clip.skeleton)))
     return replace(clip, translation=clip.local_translation(), translated=joints, source=None)
+
+
+def twice(clip: Clip) -> Clip:
+    """Two bodies in one file, that do the same."""
+    old, count = clip.skeleton, len(clip.skeleton)
+    skeleton = Skeleton(
+        (*old.names, *(f"B_{name}" for name in old.names)),
+        (*old.parents, *(parent + count if parent >= 0 else -1 for parent in old.parents)),
+        np.tile(old.rest_translation, (2, 1)),
+    )
+    translated = (*clip.translated, *(joint + count for joint in clip.translated))
+    both = np.tile(clip.rotation, (1, 2, 1)), np.tile(clip.translation, (1, 2, 1))
+    return Clip(skeleton, *both, clip.fps, translated)

@@ -144,7 +144,7 @@ def _convert(
     kept = []
     if onto is not None:
         made = retarget(made, rig)
-        kept = _kept(clip, rig, made) if other_rig(clip, rig) else []
+        kept = [*_left(clip), *_kept(clip, rig, made)] if other_rig(clip, rig) else []
     made = resample(made, fps, smooth=True) if fps is not None else made
     notes = [*kept, *save(replace(made, name=output.stem), output, force=force)]
     if json:
@@ -156,6 +156,15 @@ def _convert(
     for note in notes:
         say(f"note: {note}")
     say(f"wrote {output}: {len(made)} frames at {made.fps:.4g} fps{said}")
+
+
+def _left(clip: Clip) -> list[str]:
+    """Whose motion, of several bodies, is not brought onto another rig."""
+    from interpose.skeletons.performers import performers
+
+    first, *others = [clip.skeleton.names[joints[0]] for joints in performers(clip.skeleton)] or [""]
+    left = f"the motion of {first} alone is brought onto it: --root takes {' or '.join(others)} instead"
+    return [left] if others else []
 
 
 def _kept(clip: Clip, rig: Clip, made: Clip) -> list[str]:
