@@ -19,7 +19,7 @@ from tests.skeletons.rigs import twice, under_root
 from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
-from interpose.finish import complete, feet, retarget
+from interpose.finish import Provenance, complete, feet, retarget
 from interpose.finish.report import GapReport
 from interpose.formats import load
 from interpose.geometry import measures, rotations
@@ -970,3 +970,32 @@ def test_a_folder_of_the_name_of_a_method_is_a_folder(cmu_walk, tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     assert registry.get(Path("small")).trained.name == "small-open"
     assert registry.get("small").trained is None
+
+
+@pytest.mark.parametrize("verb", ["forecast", "stitch"])
+def test_frames_that_nobody_has_recorded_are_made_of_all_bodies(duo, verb):
+    """Whichever is meant: else the other one would stand still in them, and jump after them."""
+    meant = replace(duo, skeleton=replace(duo.skeleton, roles={"root": "B_Hips"}))
+    if verb == "forecast":
+        done = tasks.forecast(meant, 30, method="small")
+        new = slice(len(duo), len(duo) + 30)
+    else:
+        done = tasks.stitch([meant.slice(0, 90), meant.slice(120, 200)], 20, method="small")
+        new = slice(90, 110)
+    for hips in range(2):
+        steps = np.linalg.norm(np.diff(done.clip.translation[new.start - 1 : new.stop, hips], axis=0), axis=1)
+        assert np.median(steps) > 1e-4
+        assert steps.max() < 0.4
+    assert (done.provenance[new] != Provenance.OBSERVED).all()
+
+
+def test_two_gaps_of_one_body_within_one_of_another_stay_two(duo, cmu_walk):
+    count = len(cmu_walk.skeleton)
+    first, other = duo.skeleton.names[:count], duo.skeleton.names[count:]
+    gaps = [Gap(40, 140, first), Gap(60, 70, other), Gap(100, 110, other)]
+    done = tasks.fill(duo, gaps, "small")
+    assert [(gap.start, gap.stop) for gap in done.report.gaps if gap.joints == other] == [
+        (60, 70),
+        (100, 110),
+    ]
+    assert np.array_equal(done.clip.rotation[70:100, count:], duo.rotation[70:100, count:])

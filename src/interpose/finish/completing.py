@@ -18,6 +18,7 @@ from interpose.finish.aiming import aimed, severed
 from interpose.finish.gap_report import same
 from interpose.finish.guarantees import STEPPED, STEPS, Ask, guaranteed
 from interpose.finish.loose import MOST, Layer, loose, without
+from interpose.finish.notes import TURNS
 from interpose.finish.opinion import certain, wipe
 from interpose.finish.path import follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance
@@ -195,14 +196,18 @@ def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation,
             led = follow(led, *gap, points)
         return led
 
-    unled = _complete(clip, observation, ask, None)
-    # A network that is told of the way takes steps for it, and turns along.
-    hips = hips_of(clip.skeleton)
-    way = follows(unled).positions()[:, hips]
-    frames = np.concatenate([np.arange(start - 1, stop + 1) for start, stop in through])
-    roughly = Pin(clip.skeleton.names[hips], frames, way[frames], tolerance=ROUGH)
-    told = _Told(ask.method.name, ask.method, (roughly,))
-    body = _complete(clip, observation, replace(ask, method=told), None)
+    body = unled = _complete(clip, observation, ask, None)
+    led = follows(unled)
+    if np.abs(led.positions() - unled.clip.positions()).max() >= UNMOVED:
+        # A network that is told of the way takes steps for it, and turns along.
+        hips = hips_of(clip.skeleton)
+        way, name = led.positions()[:, hips], clip.skeleton.names[hips]
+        frames = [np.arange(start - 1, stop + 1) for start, stop in through]
+        roughly = tuple(Pin(name, some, way[some], tolerance=ROUGH) for some in frames)
+        told = replace(ask, method=_Told(ask.method.name, ask.method, roughly))
+        body = _complete(clip, observation, told, None)
+        if _fell(body, ask.method) > _fell(unled, ask.method):
+            body = unled
     led = follows(body)
     nothing = np.zeros_like(known.rotation)
     # Who goes there anyway stands as firmly as before.
@@ -213,16 +218,25 @@ def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation,
 
     def judged(gap: GapReport) -> GapReport:
         gap = _on_path(gap, path, ways[1])
+        if gap.path is None:
+            return gap
+        # The path says which way round is meant.
+        gap = replace(gap, notes=tuple(note for note in gap.notes if not note.startswith(TURNS)))
         own, new = (
             np.linalg.norm(np.diff(way[gap.start - 1 : gap.stop + 1], axis=0), axis=1).sum() for way in ways
         )
-        if gap.path is None or new <= FURTHER * own:
+        if new <= FURTHER * own:
             return gap
         said = f"flagged: its way of {new:.1f} m is {new / own:.1f} {LONG}, and steps are too short for it"
         return replace(gap, notes=(*gap.notes, f"{said}. A longer gap or a nearer point helps"))
 
     reports = [judged(gap) for gap in done.report.gaps]
     return replace(done, report=replace(done.report, gaps=reports))
+
+
+def _fell(done: Completion, method: Method) -> int:
+    """How many gaps another method filled."""
+    return sum(gap.method != method.name for gap in done.report.gaps)
 
 
 def _on_path(gap: GapReport, path: Mapping[int, np.ndarray], way: np.ndarray) -> GapReport:

@@ -58,6 +58,7 @@ DRIFTS = 0.08
 # Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
 ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
+TURNS = "flagged: it turns by"  # how a note begins of who goes round once more
 BODY = 10  # joints: what hangs together and has fewer is a prop
 
 
@@ -261,7 +262,7 @@ def whirling(finished: Clip, known: Observation, gap: Gap, first: int) -> list[s
     if abs(way - short) < 180 or abs(abs(way) - abs(short)) < ROUND:
         return []
     left = way * find_humanoid(part).hand[0] > 0 if find_mapping(part.skeleton).usable else way > 0
-    said = f"flagged: it turns by {abs(way):.0f} degrees to the {'left' if left else 'right'}"
+    said = f"{TURNS} {abs(way):.0f} degrees to the {'left' if left else 'right'}"
     other = "" if way * short > 0 else " the other way"
     return [
         f"{said}, where the poses beside the gap are {abs(short):.0f} apart{other}: a key in between says "

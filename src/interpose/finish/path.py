@@ -97,8 +97,9 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
 def _led(clip: Clip) -> list[int]:
     """What a path leads: the body, and targets of its feet and hands, but no chair that keeps its place."""
     top, *others = carriers(clip)
-    ways = {joint: clip.translation[:, clip.translated.index(joint)] for joint in others}
-    return [top, *(joint for joint, way in ways.items() if np.ptp(way, axis=0).max() > STILL)]
+    goes = np.ptp(clip.translation, axis=0).max(axis=-1) > STILL
+    below = clip.skeleton.below[list(clip.translated)]
+    return [top, *(joint for joint in others if goes[below[:, joint]].any())]
 
 
 def _turns(old: np.ndarray, new: np.ndarray, near: np.ndarray, fps: float) -> np.ndarray:

@@ -571,7 +571,7 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
         if end - begin > last_step:
             inside = slice(end - step, end) if backwards else slice(begin, begin + step)
         own = slice(inside.start - first, inside.stop - first)
-        each = ask(cards, motion.part(part), own)
+        each = ask(cards, (led(motion, begin, end) if leads else motion).part(part), own)
         said = agreed(each, own)
         if in_turn and sees_all and said.expected[ahead].mean() <= SURE:
             inside, own = slice(begin, end), ahead
@@ -582,7 +582,7 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
             errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
         if whole and not (closed and sees_all):
             errors.open(said.expected[ahead], hole, backwards)
-        if leads or (astray and not sees_all):
+        if astray and not leads and not sees_all:
             said = agreed(ask(cards, led(motion, begin, end).part(part), own), own)
         if fastest is not None:
             beside = motion.root[end : end + BLOCK][::-1] if backwards else motion.root[begin - BLOCK : begin]

@@ -258,6 +258,16 @@ class Observation:
         return seen
 
     @classmethod
+    def without(cls, clip: Clip, gaps: Iterable[Gap]) -> Observation:
+        """Everything is known but frames that nobody has recorded: nothing of any, whoever is meant."""
+        seen = cls.full(clip)
+        for gap in gaps:
+            frames = slice(gap.check(len(clip)).start, gap.stop)
+            seen.rotation[frames] = False
+            seen.translation[frames, list(clip.translated)] = False
+        return seen
+
+    @classmethod
     def from_nan(
         cls,
         skeleton: Skeleton,

@@ -86,7 +86,8 @@ def forecast(
     held = np.minimum(np.arange(len(clip) + frames), len(clip) - 1)
     longer = clip.take(held)
     gap = Gap(len(clip), len(longer))
-    job = plan(longer, Observation.from_gaps(longer, [gap]), method, None, None, {})[0]
+    seen = Observation.without(longer, [gap])
+    job = plan(longer, seen, method, None, None, {})[0]
     chosen = job.method if method == "auto" and job.method else method
     name = registry.name_of(chosen)
     if samples > 1 and job.method and (why := refusal(job.method, longer, gap)):
@@ -104,7 +105,7 @@ def forecast(
 
     done = []
     for i, drawn in enumerate(seeds):
-        one = fill(longer, [gap], chosen, seed=drawn, progress=part(i), temperature=temperature)
+        one = fill(longer, seen, chosen, seed=drawn, progress=part(i), temperature=temperature)
         told = one.report.gaps[0]
         if samples > 1 and told.method != one.report.method:
             raise RequestError(

@@ -12,7 +12,7 @@ from interpose.clip import Clip
 from interpose.errors import RequestError, is_number
 from interpose.finish import Completion
 from interpose.methods.protocol import Method
-from interpose.observation import Gap, Pin
+from interpose.observation import Gap, Observation, Pin
 from interpose.observation.observation import frame_number
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
@@ -60,7 +60,7 @@ def between(
     zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
     done = fill(
         clip,
-        gaps,
+        Observation.without(clip, gaps),
         method,
         seed=seed,
         progress=progress,

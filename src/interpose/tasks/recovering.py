@@ -83,7 +83,9 @@ def recover(
         for i, body in enumerate(several):
             along = None if progress is None else partial(_along, progress, i, len(several))
             bodies[body] = recover(clip_of(clip, body), None, (start, stop), method, seed, along)
-        return assembled(clip, bodies)
+        done = assembled(clip, bodies)
+        gaps = [replace(gap, number=number) for number, gap in enumerate(done.report.gaps, 1)]
+        return replace(done, report=replace(done.report, gaps=gaps))
     if joints is None:
         swapped = swaps(clip, start, stop)
         sides = put_back(clip, swapped)

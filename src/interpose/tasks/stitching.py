@@ -85,12 +85,13 @@ def stitch(
     if isinstance(frames, str) and frames == "auto" and align:
         lengths, whys = _tried(line, method, action, seed)
         line = timeline.lay(clips, lengths, align, loop).because(whys)
-    done = fill(line.clip, line.gaps, method, seed=seed, progress=progress, action=action)
+    seen = Observation.without(line.clip, line.gaps)
+    done = fill(line.clip, seen, method, seed=seed, progress=progress, action=action)
     clip, provenance, closing = done.clip, done.provenance, None
     if line.again is not None:
         start = line.again.start
         around = acceleration(clip.slice(start - 1, start + 2).positions())
-        limits = seams.limits(line.clip, Observation.from_gaps(line.clip, line.gaps))
+        limits = seams.limits(line.clip, seen)
         jump = limit = None
         if around.size and limits is not None:
             joint = int((around[0] / limits).argmax())

@@ -18,6 +18,7 @@ from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation
+from interpose.skeletons.performers import performers
 from interpose.tasks.planning import Job
 
 CONTEXT = 2.0  # seconds of the clip on both sides of a gap that a method sees
@@ -81,7 +82,8 @@ def _pieces(clip: Clip, observation: Observation, gap: Gap) -> Iterator[tuple[in
     piece, overlap = round(PIECE * clip.fps), round(OVERLAP * clip.fps)
     if observation.rotation[gap.start : gap.stop].all():
         piece = len(gap)
-    empty = np.logical_not(observation.rotation.any(axis=1))
+    bodies = performers(clip.skeleton) or [range(len(clip.skeleton))]
+    empty = np.any([~observation.rotation[:, list(body)].any(axis=1) for body in bodies], axis=0)
     start = gap.start
     while True:
         stop = min(start + piece, gap.stop)
@@ -127,7 +129,12 @@ def joined(reports: list[GapReport]) -> list[GapReport]:
     done: list[GapReport] = []
     for one in reports:
         last = done[-1] if done else None
-        if last is None or (last.number, last.joints, last.method) != (one.number, one.joints, one.method):
+        # Pieces of one gap overlap; of two bodies one may be lost twice while the other one is.
+        if (
+            last is None
+            or one.start > last.stop
+            or (last.number, last.joints, last.method) != (one.number, one.joints, one.method)
+        ):
             done.append(one)
             continue
         # Of all frames so far, those that the new piece added.
