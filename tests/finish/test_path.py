@@ -11,6 +11,7 @@ from interpose.finish.path import FASTEST, _no_faster, follow
 from interpose.geometry import measures, rotations
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
+from interpose.skeletons.humanoid import reflect
 
 GAP, MIDDLE = (140, 190), 165
 
@@ -49,12 +50,12 @@ def test_who_is_led_along_a_way_takes_steps_for_it(cmu_walk):
     assert gap.gliding < 0.3
 
 
-@pytest.mark.parametrize("side", [1, -1])
-def test_who_is_led_round_three_quarters_of_a_circle_turns_by_as_much(cmu_walk, side):
+@pytest.mark.parametrize(("side", "quarters"), [(1, 3), (-1, 3), (1, 4), (-1, 4)])
+def test_who_is_led_round_a_circle_turns_along(cmu_walk, side, quarters):
     """And nobody asks whether a quarter the other way is meant, as without the path."""
     course = float(facing(find_humanoid(cmu_walk).positions(cmu_walk.slice(60, 61)))[0])
     stands = cmu_walk.take(np.repeat(60, 240))
-    angles = side * 1.5 * np.pi * np.clip((np.arange(240) - 29) / 181, 0, 1)
+    angles = side * quarters * np.pi / 2 * np.clip((np.arange(240) - 29) / 181, 0, 1)
     heading = course + angles
     start = stands.root[0, [0, 2]]
     ring = np.stack([np.cos(course) - np.cos(heading), np.sin(heading) - np.sin(course)], axis=1)
@@ -66,9 +67,14 @@ def test_who_is_led_round_three_quarters_of_a_circle_turns_by_as_much(cmu_walk, 
     path = {frame: way[frame] for frame in range(45, 205, 15)}
     done = interpose.fill(clip, (30, 210), method="small", path=path)
     turned = anatomy.turning(done.clip.slice(29, 211))[-1]
-    assert turned == pytest.approx(side * 1.5 * np.pi, abs=0.1)
+    assert turned == pytest.approx(side * quarters * np.pi / 2, abs=0.1)
     (gap,) = done.report.gaps
     assert not any("it turns by" in note for note in gap.notes)
+    if quarters == 4:
+        across = np.array([-1.0, 1.0])
+        mirrored = {frame: point * across for frame, point in path.items()}
+        other = interpose.fill(reflect(clip), (30, 210), method="small", path=mirrored)
+        assert np.abs(other.clip.positions() * [-1.0, 1.0, 1.0] - done.clip.positions()).max() < 1e-6
 
 
 def test_the_body_turns_along_the_way_and_the_ends_stay(cmu_walk, aside):

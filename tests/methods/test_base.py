@@ -59,9 +59,8 @@ def seen(frames: int, hole: slice, lacks: str = "") -> base.Seen:
     known[hole] = ~has
     local = np.broadcast_to(rotations.identity(), (frames, len(JOINTS), 4))
     zeros = np.zeros((frames, len(JOINTS), 3))
-    return base.Seen(
-        local, zeros[:, 0], known, has, ("", ""), zeros[0], zeros, zeros[..., 0] > 0, zeros[:, 0] * np.nan
-    )
+    never, nowhere, any_ = zeros[..., 0] > 0, zeros[:, 0] * np.nan, local[:, 0] * np.nan
+    return base.Seen(local, zeros[:, 0], known, has, ("", ""), zeros[0], zeros, never, nowhere, any_)
 
 
 @pytest.mark.parametrize("lacks", ["", "Spine1"])

@@ -111,6 +111,7 @@ def test_the_javascript_of_the_docs_fills_a_character_as_python_does(cmu_walk, t
         nothing,
         nothing[..., 0] > 0,
         nothing[:, 0] * np.nan,
+        local[:, 0] * np.nan,
     )
     (answer,) = run(card, seen)
     expected = body.to_clip(

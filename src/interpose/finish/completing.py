@@ -20,7 +20,7 @@ from interpose.finish.guarantees import STEPPED, STEPS, Ask, guaranteed
 from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.notes import TURNS
 from interpose.finish.opinion import certain, wipe
-from interpose.finish.path import follow, over_floor, spans
+from interpose.finish.path import ahead, follow, over_floor, spans
 from interpose.finish.report import Completion, GapReport, Provenance
 from interpose.methods.classical import Linear, Spline, ZeroVelocity
 from interpose.methods.protocol import Method, Raw
@@ -204,10 +204,13 @@ def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation,
         way, name = led.positions()[:, hips], clip.skeleton.names[hips]
         frames = [np.arange(start - 1, stop + 1) for start, stop in through]
         roughly = tuple(Pin(name, some, way[some], tolerance=ROUGH) for some in frames)
-        told = replace(ask, method=_Told(ask.method.name, ask.method, roughly))
-        body = _complete(clip, observation, told, None)
-        if _fell(body, ask.method) > _fell(unled, ask.method):
-            body = unled
+        tries = [unled, _complete(clip, observation, _telling(ask, roughly), None)]
+        # Where it would go aside nevertheless, as round a whole circle, it is told where to face, too.
+        turns = [ahead(tries[1].clip, known.frames, *gap) for gap in through]
+        if any(one is not None for one in turns):
+            facing = tuple(replace(pin, orientation=one) for pin, one in zip(roughly, turns))
+            tries.append(_complete(clip, observation, _telling(ask, facing), None))
+        body = min(reversed(tries), key=lambda done: _fell(done, ask.method))
     led = follows(body)
     nothing = np.zeros_like(known.rotation)
     # Who goes there anyway stands as firmly as before.
@@ -232,6 +235,10 @@ def _along(path: Mapping[int, np.ndarray], clip: Clip, observation: Observation,
 
     reports = [judged(gap) for gap in done.report.gaps]
     return replace(done, report=replace(done.report, gaps=reports))
+
+
+def _telling(ask: Ask, pins: tuple[Pin, ...]) -> Ask:
+    return replace(ask, method=_Told(ask.method.name, ask.method, pins))
 
 
 def _fell(done: Completion, method: Method) -> int:
@@ -281,8 +288,7 @@ def _pinned(
     unled = _complete(clip, free, ask, path)
     # A network that is told of one frame changes that frame: it is told the whole way there and back.
     ways = pins.ways(unled.clip, known, asked)
-    told = _Told(ask.method.name, ask.method, ways)
-    body = _complete(clip, free, replace(ask, method=told), path) if ways else unled
+    body = _complete(clip, free, _telling(ask, ways), path) if ways else unled
 
     def laid(down: np.ndarray | None = None) -> Completion:
         met = pins.meet(body.clip, known, asked, down)

@@ -18,6 +18,8 @@ from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
+from interpose.skeletons import find_humanoid, find_mapping
+from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import STILL, carriers, hips_of, moved
 
 # Metres a second: who is slower does not turn along its way, who is twice as fast does so altogether.
@@ -26,6 +28,8 @@ BEYOND = 1.2  # times as far aside as any point says: a spline that swings out f
 SMOOTH = 0.15  # seconds (standard deviation) over which the way is seen
 FLOOR = np.array([1.0, 0.0, 1.0])
 EASE = 0.3  # seconds at both ends over which the body begins and ceases to turn
+# Somebody goes aside whose hips face elsewhere by more than this, in so many of the frames in which he goes.
+ASIDE, OFTEN = np.radians(60), 1 / 3
 FASTEST = np.radians(200)  # a second by which the body is turned besides its own turns at most
 
 
@@ -92,6 +96,36 @@ def follow(clip: Clip, start: int, stop: int, points: Mapping[int, np.ndarray]) 
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     rotation[start:stop], translation[start:stop] = led.rotation, led.translation
     return clip.with_motion(rotation, translation)
+
+
+def ahead(clip: Clip, known: np.ndarray, start: int, stop: int) -> np.ndarray | None:
+    """(stop - start + 2, 4) how the hips would be turned if a body faced where it goes, from frame start - 1
+    to stop; None of who does, who goes nowhere, and who does not beside it either, as boxers.
+
+    known: (F,) which frames are known as a whole.
+    """
+    if not find_mapping(clip.skeleton).usable:
+        return None
+    near = round(clip.fps)
+    lo, hi = max(start - near, 0), min(stop + near, len(clip))
+    part = clip.slice(lo, hi)
+    body = find_humanoid(part)
+    placed = body.positions(part)
+    way = _smooth(np.gradient(placed[:, 0], axis=0)[:, [0, 2]] * clip.fps, clip.fps)
+    goes = np.linalg.norm(way, axis=1) > 2 * SLOW
+    faces, course = facing(placed), np.arctan2(way[:, 0], way[:, 1])
+    aside = goes & (np.abs(np.angle(np.exp(1j * (faces - course)))) > ASIDE)
+    inside = ~known[lo:hi]
+    if aside[inside].sum() < OFTEN * max(goes[inside].sum(), clip.fps):
+        return None
+    if aside[~inside].sum() > OFTEN * goes[~inside].sum():
+        return None
+    at, told = np.arange(len(part)), goes | ~inside
+    wanted = np.interp(at, at[told], np.unwrap(np.where(inside, course, faces)[told]))
+    span = slice(start - lo - 1, stop - lo + 1)
+    off = _smooth(_smooth(wanted, clip.fps) - np.unwrap(faces), clip.fps)[span]
+    turn = rotations.about("Y", body.hand[0] * off)
+    return rotations.multiply(turn, part.kinematics()[0][span, hips_of(clip.skeleton)])
 
 
 def _led(clip: Clip) -> list[int]:

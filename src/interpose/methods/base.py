@@ -25,7 +25,17 @@ from interpose.methods.classical import Spline
 from interpose.methods.joining import joined
 from interpose.methods.protocol import Raw
 from interpose.observation import ROUGH, Gap, Observation, Pin
-from interpose.skeletons import ACROSS, ACROSS_TURN, FEET, JOINTS, PARENTS, SIDES, Mapping, find_mapping
+from interpose.skeletons import (
+    ACROSS,
+    ACROSS_TURN,
+    FEET,
+    JOINTS,
+    PARENTS,
+    SIDES,
+    Humanoid,
+    Mapping,
+    find_mapping,
+)
 from interpose.skeletons.mirror import mirrored
 from interpose.skeletons.performers import by_itself, performers
 
@@ -163,6 +173,7 @@ class Base:
             bones,
             *pinned(observation, body.mapping, times, body.scale * body.hand),
             way(observation, body.mapping, times, body.scale * body.hand),
+            faces(observation, body, base, times),
         )
         answer = run_long(cards, seen)
         said = repeating.Motion(answer.local, answer.root)
@@ -289,6 +300,23 @@ def way(observation: Observation, mapping: Mapping, times: np.ndarray, scale: np
     return found
 
 
+def faces(observation: Observation, body: Humanoid, clip: Clip, times: np.ndarray) -> np.ndarray:
+    """(T, 4) how the hips are turned roughly, canonical; NaN where nothing says so.
+
+    clip: of the body, whose hips need be turned anyhow.
+    """
+    found, hips = np.full((len(times), 4), np.nan), body.mapping["Hips"]
+    for pin in observation.pins:
+        if body.mapping.skeleton.index(pin.joint) == hips and leads(pin, 0) and pin.orientation is not None:
+            rotation, above = clip.rotation.copy(), clip.skeleton.parents[hips]
+            beneath = clip.kinematics()[0][pin.frames, above] if above >= 0 else rotations.identity(1)
+            rotation[pin.frames, hips] = rotations.relative(beneath, pin.orientation)
+            turned = body.rotations(clip.with_motion(rotation, clip.translation))[:, 0]
+            told = (times >= pin.frames[0]) & (times <= pin.frames[-1])
+            found[told] = sample_rotations(rotations.continuous(turned[:, None]), times[told])[:, 0]
+    return found
+
+
 def through(observation: Observation, placed: np.ndarray, fps: float) -> np.ndarray:
     """(F,) at which of its frames to look for what happens in each frame of a clip, so that motion goes
     through lone keys between gaps of the whole pose, and does not slow down there.
@@ -322,7 +350,8 @@ class Seen:
         bones: (22, 3) metres.
         places: (T, 22, 3) metres, where joints are to be.
         pins: (T, 22) of which joints that is said.
-        way: (T, 3) metres, where the hips go roughly; NaN where that is not said.
+        way, faces: (T, 3) metres and (T, 4), where the hips go and how they are turned, roughly; NaN where
+            that is not said.
     """
 
     local: np.ndarray
@@ -334,10 +363,11 @@ class Seen:
     places: np.ndarray
     pins: np.ndarray
     way: np.ndarray
+    faces: np.ndarray
 
     def part(self, frames: slice) -> Seen:
         """Of some frames."""
-        names = ("local", "root", "known", "places", "pins", "way")
+        names = ("local", "root", "known", "places", "pins", "way", "faces")
         return replace(self, **{name: getattr(self, name)[frames] for name in names})
 
     def backwards(self) -> Seen:
@@ -357,6 +387,7 @@ class Seen:
             self.places[:, sides] * across,
             self.pins[:, sides],
             self.way * across,
+            self.faces * ACROSS_TURN.values,
         )
 
 
@@ -450,7 +481,10 @@ def led(motion: Seen, begin: int, end: int) -> Seen:
         # What is completed already is beside it by some centimetres.
         for beside, away in ((begin - 1, since), (end, until)):
             root[begin:end] += (1 + away / BACK) * np.exp(-away / BACK) * (root[beside] - motion.way[beside])
-        return replace(motion, root=root, known=known)
+        local = motion.local.copy()
+        if np.isfinite(motion.faces[begin:end]).all():
+            local[begin:end, 0], known[begin:end, 0] = motion.faces[begin:end], ROUGHLY
+        return replace(motion, local=local, root=root, known=known)
     whole = end - begin + 1
     step = (root[end] - root[begin - 1]) / whole
     turns = np.zeros((end - begin, 3))
