@@ -106,6 +106,11 @@ def weights_alone(monkeypatch):  # type: ignore[no-untyped-def]
     monkeypatch.setattr(export, "export_base_onnx", write)
 
 
+def unled(local):  # type: ignore[no-untyped-def]
+    """Of a motion of which nobody says where it goes and faces."""
+    return local[:, 0, 1:] * np.nan, local[:, 0] * np.nan
+
+
 def test_sizes():
     count = {name: sum(p.numel() for p in Base(config).parameters()) for name, config in CONFIGS.items()}
     assert 2e6 < count["small"] < 4e6
@@ -358,7 +363,9 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
         expected = model(*(v.float() if v.is_floating_point() else v for v in given))
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
     actions = (card.labels[int(given[5][0])], "")
-    (said,) = method.run(card, method.Seen(local, root, known == 1, ALL, actions, bones, pinned, pins))
+    (said,) = method.run(
+        card, method.Seen(local, root, known == 1, ALL, actions, bones, pinned, pins, *unled(local))
+    )
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
     assert np.allclose(100 * said.expected, expected[3][0], rtol=1e-3)
@@ -393,7 +400,9 @@ def test_weights_beside_the_graph(model, graph, given, tmp_path, monkeypatch):
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
         sizes.append(path.stat().st_size)
         local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-        said += method.run(of(path), method.Seen(local, root, known == 1, ALL, ("", ""), bones, pinned, pins))
+        said += method.run(
+            of(path), method.Seen(local, root, known == 1, ALL, ("", ""), bones, pinned, pins, *unled(local))
+        )
         for exact in (False, True) if files == 1 else (False,):
             again = Base(TINY)
             restore(again, path)
@@ -445,7 +454,7 @@ def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given,
         cards.append(of(tmp_path / f"{seed}.onnx"))
     one, two = cards[0], replace(cards[1], labels=["", "run"])
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-    seen = method.Seen(local, root, known == 1, ALL, ("walk", "walk"), bones, pinned, pins)
+    seen = method.Seen(local, root, known == 1, ALL, ("walk", "walk"), bones, pinned, pins, *unled(local))
     hole = slice(10, 30)
     both, first = (method.agreed(method.ask(cards, seen, hole), hole) for cards in ([one, two], [one]))
     second = method.agreed(method.ask([two], replace(seen, actions=("", "")), hole), hole)
@@ -468,7 +477,10 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
     known[12:20, 5:9] = True
     pins = pins.copy()
     pins[15, 17] = True
-    seen, card = method.Seen(local, root, known, ALL, ("walk", ""), bones, pinned, pins), of(graph)
+    seen, card = (
+        method.Seen(local, root, known, ALL, ("walk", ""), bones, pinned, pins, *unled(local)),
+        of(graph),
+    )
     once, image = method.run(card, seen)[0], method.run(card, seen.mirrored())[0]
     assert np.abs(once.root - image.root * [-1, 1, 1]).max() > 1e-3  # by itself it is not
     for limit in (np.pi, 0.0):
