@@ -77,12 +77,12 @@ FIRM, GUESSED = 30, 0.75
 # 89 cm so (98 with half of LEAD), by 101 where nothing leads them (they run at 2.5 m/s, people at 2.2) and by
 # 130 along a straight line; in gaps of 7 s by 85 so, and by 81 where nothing leads them.
 ASTRAY, ROUGHLY, LEAD = 225, 0.5, 60.0
-# Where it is said where the hips go, they come back to it by e in about so many frames from where they are.
-BACK = 5.0
 # So they are in shorter holes, too, that begin or end slower than STANDS (metres a frame) or at a lone frame,
 # but whose ends are apart by more than GOES for every frame: who stands would stand for as long as he can,
 # and then run.
 STANDS, GOES = 0.4 / 30, 0.3 / 30
+# Where somebody says where the hips go, they come back to it by e in about so many frames.
+BACK = 5.0
 # Of what follows nothing, or is followed by nothing: frames over which a pace is measured, and those of known
 # motion in which it is, over as many; who goes steadily goes in each at such a share of the fastest, and at
 # so many metres a frame. No window is slowed to less than a share.
