@@ -25,7 +25,8 @@ from interpose.formats import load
 from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
 from interpose.geometry.time import resample
-from interpose.methods import base, registry, weights
+from interpose.methods import registry, weights
+from interpose.methods.base import holes
 from interpose.observation import Gap, Observation, Pin, timeline
 from interpose.observation.scan import intact, scan
 from interpose.skeletons import find_humanoid
@@ -926,11 +927,11 @@ def test_the_beginning_of_a_clip_is_said_as_firmly_as_its_end(cmu_walk, monkeypa
     class Watched(np.ndarray):
         def __setitem__(self, key, value):
             super().__setitem__(key, value)
-            if isinstance(value, float) and value == base.GUESSED:
+            if isinstance(value, float) and value == holes.GUESSED:
                 guessed.append(self[key].size)
 
     ones = np.ones
-    monkeypatch.setattr(base.np, "ones", lambda *args, **kwargs: ones(*args, **kwargs).view(Watched))
+    monkeypatch.setattr(holes.np, "ones", lambda *args, **kwargs: ones(*args, **kwargs).view(Watched))
     for gap in (Gap(0, 25), Gap(len(cmu_walk) - 25, len(cmu_walk))):
         tasks.fill(cmu_walk, [gap], "small")
     assert set(guessed) == {0}

@@ -13,7 +13,7 @@ from interpose.errors import RequestError
 from interpose.finish import Provenance, anatomy, feet, pins, seams
 from interpose.formats import load, save
 from interpose.geometry import kinematics, rotations
-from interpose.methods.base import pinned
+from interpose.methods.base.observed import pinned
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation, Pin

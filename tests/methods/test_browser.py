@@ -15,7 +15,7 @@ import interpose
 from interpose.cli import main
 from interpose.geometry import kinematics, rotations
 from interpose.methods import weights
-from interpose.methods.base import Seen, run
+from interpose.methods.base.graph import Seen, run
 from interpose.methods.bodies import observed_body
 from interpose.observation import Observation
 from interpose.skeletons import PARENTS, find_humanoid

@@ -20,6 +20,8 @@ from interpose.geometry import kinematics, rotations  # noqa: E402
 from interpose.geometry.ground import turn  # noqa: E402
 from interpose.methods import base as method  # noqa: E402
 from interpose.methods import registry, weights  # noqa: E402
+from interpose.methods.base import graph as graph_of  # noqa: E402
+from interpose.methods.base.observed import COLUMNS, knowledge  # noqa: E402
 from interpose.models.base import (  # noqa: E402
     CONFIGS,
     COUNT,
@@ -54,7 +56,7 @@ from interpose.training.export import export_base, narrowest  # noqa: E402
 from interpose.training.loop import restore, shard_paths  # noqa: E402
 from interpose.training.poses import Poses, labels_of  # noqa: E402
 
-ALL = np.ones(method.COLUMNS, bool)
+ALL = np.ones(COLUMNS, bool)
 TINY = BaseConfig(("", "walk"), width=24, heads=2, layers=1, longest=140)
 
 
@@ -363,8 +365,8 @@ def test_a_run_goes_on_and_is_exported_whole(trained, given):
         expected = model(*(v.float() if v.is_floating_point() else v for v in given))
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
     actions = (card.labels[int(given[5][0])], "")
-    (said,) = method.run(
-        card, method.Seen(local, root, known == 1, ALL, actions, bones, pinned, pins, *unled(local))
+    (said,) = graph_of.run(
+        card, graph_of.Seen(local, root, known == 1, ALL, actions, bones, pinned, pins, *unled(local))
     )
     assert rotations.angle(said.local, expected[0][0].double().numpy()).max() < 1e-3
     assert np.allclose(said.root, expected[1][0], atol=1e-4)
@@ -400,8 +402,9 @@ def test_weights_beside_the_graph(model, graph, given, tmp_path, monkeypatch):
         assert all(shard.stat().st_size < size + 10_000 for shard in shards)
         sizes.append(path.stat().st_size)
         local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-        said += method.run(
-            of(path), method.Seen(local, root, known == 1, ALL, ("", ""), bones, pinned, pins, *unled(local))
+        said += graph_of.run(
+            of(path),
+            graph_of.Seen(local, root, known == 1, ALL, ("", ""), bones, pinned, pins, *unled(local)),
         )
         for exact in (False, True) if files == 1 else (False,):
             again = Base(TINY)
@@ -443,7 +446,7 @@ def of(path):  # type: ignore[no-untyped-def]
 
 def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given, tmp_path, monkeypatch):
     """And an action that they do not know is none to them; what is known stays exactly."""
-    monkeypatch.setattr(method, "CALMER", 0.0)  # what is drawn at random snaps, all of it
+    monkeypatch.setattr(graph_of, "CALMER", 0.0)  # what is drawn at random snaps, all of it
     cards = []
     for seed in (1, 2):
         other = onnx.load(graph)
@@ -454,12 +457,12 @@ def test_weights_that_are_asked_beside_others_count_to_their_share(graph, given,
         cards.append(of(tmp_path / f"{seed}.onnx"))
     one, two = cards[0], replace(cards[1], labels=["", "run"])
     local, root, known, pinned, pins, _, bones = (v[0].numpy() for v in given)
-    seen = method.Seen(local, root, known == 1, ALL, ("walk", "walk"), bones, pinned, pins, *unled(local))
+    seen = graph_of.Seen(local, root, known == 1, ALL, ("walk", "walk"), bones, pinned, pins, *unled(local))
     hole = slice(10, 30)
-    both, first = (method.agreed(method.ask(cards, seen, hole), hole) for cards in ([one, two], [one]))
-    second = method.agreed(method.ask([two], replace(seen, actions=("", "")), hole), hole)
+    both, first = (graph_of.agreed(graph_of.ask(cards, seen, hole), hole) for cards in ([one, two], [one]))
+    second = graph_of.agreed(graph_of.ask([two], replace(seen, actions=("", "")), hole), hole)
     assert np.abs(first.root - second.root).max() > 1e-3
-    share = method.BESIDE
+    share = graph_of.BESIDE
     assert np.allclose(both.root, (1 - share) * first.root + share * second.root)
     assert np.allclose(both.expected, (1 - share) * first.expected + share * second.expected)
     apart = rotations.angle(first.local, second.local)
@@ -478,16 +481,16 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
     pins = pins.copy()
     pins[15, 17] = True
     seen, card = (
-        method.Seen(local, root, known, ALL, ("walk", ""), bones, pinned, pins, *unled(local)),
+        graph_of.Seen(local, root, known, ALL, ("walk", ""), bones, pinned, pins, *unled(local)),
         of(graph),
     )
-    once, image = method.run(card, seen)[0], method.run(card, seen.mirrored())[0]
+    once, image = graph_of.run(card, seen)[0], graph_of.run(card, seen.mirrored())[0]
     assert np.abs(once.root - image.root * [-1, 1, 1]).max() > 1e-3  # by itself it is not
     for limit in (np.pi, 0.0):
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr(method, "AGREE", limit)
+            patch.setattr(graph_of, "AGREE", limit)
             said, other = (
-                method.mean(*method.run_both(card, one), slice(0, 40)) for one in (seen, seen.mirrored())
+                graph_of.mean(*graph_of.run_both(card, one), slice(0, 40)) for one in (seen, seen.mirrored())
             )
         back = seen.mirrored()
         back.local, back.root = other.local, other.root
@@ -502,7 +505,7 @@ def test_the_mirror_image_is_completed_as_the_mirror_image(graph, given):
 def test_knowledge_of_canonical_rotations(cmu_walk):
     mapping = find_mapping(cmu_walk.skeleton)
     seen = Observation.from_gaps(cmu_walk, [Gap(5, 9, ("LeftForeArm",)), Gap(20, 22)])
-    known = method.knowledge(seen, mapping)
+    known = knowledge(seen, mapping)
     row = mapping.joints.index(cmu_walk.skeleton.index("LeftForeArm"))
     assert not known[5:9, row].any()
     assert known[5:9, np.arange(COUNT + 1) != row].all()

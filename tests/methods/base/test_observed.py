@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from interpose.methods.base import through
+from interpose.methods.base.observed import through
 from interpose.observation import Gap, Observation
 
 
