@@ -21,7 +21,7 @@ from figure1 import GAP, told, write
 import interpose
 from interpose.datasets import clips
 from interpose.datasets.catalogue import FPS
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, sheet, strip
 
 

@@ -11,7 +11,7 @@ import argparse
 from pathlib import Path
 
 import interpose
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, strip
 
 TRIAL, START, TARGET, ANCHOR = "16/16_22.bvh", 12, 72, 42

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import interpose
 from interpose.clip import Clip
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, strip
 
 WALK, OTHER, ARM = "49_01", "49_08", ("RightArm", "RightForeArm", "RightHand")

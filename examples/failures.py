@@ -15,7 +15,7 @@ from pathlib import Path
 
 import interpose
 from interpose.geometry.measures import joint_error
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, strip
 
 # name: (trial, gap in frames at 30 fps, the frame of it that is a key, title)

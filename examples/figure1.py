@@ -16,7 +16,7 @@ from pathlib import Path
 import interpose
 from interpose.cli.outputs import compare
 from interpose.datasets import Entry, clips
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, sheet, strip
 
 SECOND, GAP = 30, 60  # frames

@@ -20,8 +20,8 @@ import numpy as np
 import interpose
 from interpose.datasets import clips
 from interpose.evaluation.table import markdown
-from interpose.geometry.time import resample
 from interpose.methods import weights
+from interpose.resampling import resample
 from interpose.show import Take, image, sheet, strip
 from interpose.skeletons import JOINTS, PARENTS, find_humanoid
 

@@ -22,11 +22,11 @@ from figure1 import GAP, SECOND, seeds
 import interpose
 from interpose.datasets import clips
 from interpose.evaluation.denoising import UNIT
-from interpose.geometry.time import resample
 from interpose.methods import weights
 from interpose.models.cae import Image, Infiller, to_image
 from interpose.observation import Observation, timeline
 from interpose.observation.corruption import gaussian_noise, joints_per_frame_mask
+from interpose.resampling import resample
 from interpose.show import image, sheet
 from interpose.skeletons import JOINTS, find_humanoid
 from interpose.training.loop import restore

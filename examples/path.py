@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 import interpose
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show.plot import line_plot
 
 TRIAL, GAP, MIDDLE, ASIDE = "49/49_01.bvh", (50, 110), 80, (0.5, 1.0)

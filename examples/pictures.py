@@ -12,7 +12,7 @@ from pathlib import Path
 
 import interpose
 from interpose import tasks
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, player, strip
 
 # name: (trial, gap in frames at 30 fps, title)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import interpose
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, strip
 
 TRIAL, GAP, HELD = "49/49_01.bvh", (60, 90), np.arange(72, 79)

@@ -25,10 +25,10 @@ import interpose
 from interpose.datasets import clips
 from interpose.evaluation.table import markdown
 from interpose.evaluation.windows import Window, windows
-from interpose.geometry.time import resample
 from interpose.methods import weights
 from interpose.methods.cae import run_long
 from interpose.observation.corruption import joints_per_frame_mask
+from interpose.resampling import resample
 from interpose.show import Take, sheet, strip
 from interpose.skeletons import JOINTS, PARENTS, find_humanoid
 

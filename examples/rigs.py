@@ -17,7 +17,7 @@ import numpy as np
 from denoising import whole
 
 import interpose
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.show import Take, strip
 from interpose.show.sheet import sheet
 from interpose.skeletons import JOINTS, find_humanoid, find_mapping

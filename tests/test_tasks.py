@@ -24,11 +24,11 @@ from interpose.finish.report import GapReport
 from interpose.formats import load
 from interpose.geometry import measures, rotations
 from interpose.geometry.ground import turn
-from interpose.geometry.time import resample
 from interpose.methods import registry, weights
 from interpose.methods.base import holes
 from interpose.observation import Gap, Observation, Pin, timeline
 from interpose.observation.scan import intact, scan
+from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 from interpose.tasks import filling, stitching, windows

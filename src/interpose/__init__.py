@@ -26,12 +26,12 @@ if TYPE_CHECKING:
     from interpose.errors import FileError, InterposeError, NothingError, RequestError
     from interpose.finish import Completion
     from interpose.formats import load, save
-    from interpose.geometry.time import resample
     from interpose.methods.protocol import Method
     from interpose.methods.registry import names as method_names
     from interpose.methods.weights import licensed as license
     from interpose.observation import Gap, Observation, Part, Pin
     from interpose.observation.finding import Finding
+    from interpose.resampling import resample
     from interpose.tasks import Cycle, Forecast, Stitched
 
 __version__ = "0.1.0"

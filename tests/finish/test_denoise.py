@@ -13,8 +13,8 @@ from interpose.evaluation.denoising import UNIT, drop, shake, tremble
 from interpose.finish import Provenance, feet
 from interpose.finish.denoise import deviation
 from interpose.geometry import measures, rotations
-from interpose.geometry.time import resample
 from interpose.observation.scan import scan
+from interpose.resampling import resample
 from interpose.skeletons import find_mapping
 
 

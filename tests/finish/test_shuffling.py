@@ -12,9 +12,9 @@ from interpose.clip import Clip
 from interpose.finish import complete, feet, guarantees, shuffling
 from interpose.finish.windows import ramp
 from interpose.geometry import measures, rotations
-from interpose.geometry.time import resample
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
+from interpose.resampling import resample
 from interpose.skeletons.carrier import hips_of
 from interpose.skeletons.mirror import mirror
 

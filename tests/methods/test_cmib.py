@@ -8,11 +8,11 @@ import pytest
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
 from interpose.methods import cmib, registry
 from interpose.methods.bodies import observed_body
 from interpose.methods.cmib import passes
 from interpose.observation import Gap, Observation
+from interpose.resampling import resample
 
 
 def keys_of(text: str, longest: float = 131) -> list[list[int]]:

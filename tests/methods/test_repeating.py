@@ -10,10 +10,10 @@ import pytest
 from interpose.clip import Clip, Skeleton
 from interpose.finish import complete
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
 from interpose.methods import registry, repeating
 from interpose.methods.repeating import Motion
 from interpose.observation import Gap, Observation, Pin
+from interpose.resampling import resample
 from interpose.skeletons import BONES, JOINTS, PARENTS
 
 FRAMES, HOLE, BACK = 240, (100, 145), slice(None, None, -1)

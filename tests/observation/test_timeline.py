@@ -12,9 +12,9 @@ from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats import load
 from interpose.geometry.ground import turn
-from interpose.geometry.time import resample
 from interpose.observation import timeline
 from interpose.observation.timeline import Placement, lay
+from interpose.resampling import resample
 from interpose.skeletons.fitting import fit
 from interpose.skeletons.humanoid import reflect
 

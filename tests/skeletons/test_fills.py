@@ -11,8 +11,8 @@ from tests.skeletons import rigs
 from interpose import formats, tasks
 from interpose.finish import feet
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
 from interpose.observation import Gap, Observation
+from interpose.resampling import resample
 from interpose.skeletons import JOINTS, find_humanoid
 
 GAP = Gap(60, 90)

@@ -111,8 +111,8 @@ def _convert(
     """One file; what makes no sense for one `alone` may be of some of a folder."""
     from interpose.finish import retarget
     from interpose.formats import save
-    from interpose.geometry.time import resample, spread
     from interpose.observation.repeated import repeats
+    from interpose.resampling import resample, spread
     from interpose.skeletons.fitting import other_rig
 
     output = _written(output, to)

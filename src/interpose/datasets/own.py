@@ -11,8 +11,8 @@ from interpose.datasets.catalogue import FPS
 from interpose.datasets.pack import Pack, Part, assemble, unfit
 from interpose.errors import FileError, InterposeError
 from interpose.formats import FORMATS, load
-from interpose.geometry.time import resample
 from interpose.observation.gapfile import is_report, read_json
+from interpose.resampling import resample
 
 NAME = "own"
 # Each fifth clip is held out; of fewer clips the last fifth of each.

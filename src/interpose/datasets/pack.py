@@ -17,7 +17,7 @@ from interpose.clip import Clip
 from interpose.datasets.catalogue import FPS, clips
 from interpose.errors import FileError, InterposeError
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.skeletons import JOINTS, canonical_positions, find_humanoid
 from interpose.skeletons.humanoid import THIGHS
 from interpose.skeletons.rest import Rest

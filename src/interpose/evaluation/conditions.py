@@ -20,10 +20,10 @@ from interpose.errors import RequestError
 from interpose.evaluation import lafan1
 from interpose.evaluation.table import markdown
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
 from interpose.methods.cmib import Cmib
 from interpose.methods.weights import Card
 from interpose.observation import Gap, Observation
+from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
 

@@ -9,7 +9,7 @@ import numpy as np
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.geometry.time import resample
+from interpose.resampling import resample
 from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import STILL, carriers, hips_of
 from interpose.skeletons.humanoid import SHORT

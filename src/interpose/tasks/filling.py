@@ -13,12 +13,12 @@ from interpose.errors import RequestError
 from interpose.finish import Completion, GapReport, Provenance, Report, anatomy, complete, on_rig_of, seams
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
-from interpose.geometry.time import resample
 from interpose.methods import auto, registry
 from interpose.methods.protocol import Method, Raw
 from interpose.observation import Gap, Observation, Part, Pin
 from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
+from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.targets import following, seated
 from interpose.tasks.moments import mended, momentary, with_moments
