@@ -82,7 +82,7 @@ _HOMES = {
     "license": "interpose.methods.weights:licensed",
     "load": "interpose.formats",
     "method_names": "interpose.methods.registry:names",
-    "resample": "interpose.geometry.time",
+    "resample": "interpose.resampling",
     "save": "interpose.formats",
 }
 
