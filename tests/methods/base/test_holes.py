@@ -55,7 +55,7 @@ def test_what_it_is_sure_of_is_said_at_once_whatever_joints_there_are(monkeypatc
 @pytest.mark.parametrize("backwards", [False, True])
 def test_the_further_a_forecast_goes_the_more_it_is_expected_to_be_off(backwards):
     """Later windows know what earlier ones guessed, and would be as sure as the first one."""
-    told = holes._Errors(np.full(100, np.nan), False, True)
+    told = holes._Errors(np.full(100, np.nan), False, np.add)
     seen = np.linspace(0.1, 0.5, 40)
     told.open(seen[::-1] if backwards else seen, (10, 90), backwards)
     told.open(np.full(40, 9.0), (10, 50), backwards)  # the first one counts

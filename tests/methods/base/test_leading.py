@@ -65,3 +65,12 @@ def test_who_stands_sets_off_at_once_for_where_he_is_to_be(errand, lone):
     done = interpose.fill(clip, gap, method="small")
     way = np.linalg.norm((done.clip.root[15:] - done.clip.root[:-15])[gap[0] : gap[1] - 15, ::2], axis=1)
     assert way.max() < 1.6 * way.mean(), way
+
+
+@pytest.mark.parametrize("led", [False, True])
+def test_who_is_led_does_not_change_his_pace_with_every_window(errand, led):
+    gap, way = (30, 210), errand.root[[29, 210]][:, ::2]
+    path = {frame: way[0] + (frame - 29) / 181 * (way[1] - way[0]) for frame in range(50, 200, 15)}
+    done = interpose.fill(errand, gap, method="small", path=path if led else {}).clip
+    changes = 900 * np.linalg.norm(np.diff(done.root[gap[0] : gap[1], ::2], 2, axis=0), axis=1)
+    assert changes.max() < 8.0, changes.round(1)

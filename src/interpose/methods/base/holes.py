@@ -10,7 +10,7 @@ import numpy as np
 from interpose.geometry.time import runs
 from interpose.methods import weights
 from interpose.methods.base.graph import Answer, Seen, agreed, ask
-from interpose.methods.base.leading import BLOCK, at_pace, eased, led, steady_pace, strays, told
+from interpose.methods.base.leading import BLOCK, at_pace, eased, led, steady, steady_pace, strays, told
 from interpose.skeletons import FEET
 
 CONTEXT = 10  # frames on both sides of a hole that are seen, as in training
@@ -75,8 +75,10 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
     fastest = None
     if whole and not closed:
         fastest = steady_pace(motion.root[end:][::-1] if backwards else motion.root[:begin])
-    # A body whose hips are known gets nowhere: limbs that hang from it are off by no more and more.
-    errors = _Errors(done.expected, closed, not motion.known[begin:end, [0, -1]].all())
+    # A body whose hips are known gets nowhere: limbs that hang from it are off by no more and more. One that
+    # is led gets nowhere else, but out of step.
+    held = bool(motion.known[begin:end, [0, -1]].all())
+    errors = _Errors(done.expected, closed, np.maximum if held else np.hypot if leads else np.add)
     hole = begin, end
     while begin < end:
         first, last = max(begin - CONTEXT, 0), min(end + CONTEXT, frames)
@@ -98,7 +100,7 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
             held_back[part] = np.where(np.isnan(held_back[part]), new, held_back[part])
         if closed or not whole:
             errors.tell(said.expected, first, slice(begin, end) if sees_all else inside, backwards, sees_all)
-        if whole and not (closed and sees_all):
+        if whole and not leads and not (closed and sees_all):
             errors.open(said.expected[ahead], hole, backwards)
         if astray and not leads and not sees_all:
             said = agreed(ask(cards, led(motion, begin, end).part(part), own), own)
@@ -111,6 +113,8 @@ def _complete_hole(cards: Sequence[weights.Card], motion: Seen, done: Answer, be
         done.stands[inside] = said.stands[own]
         begin, end = (begin, inside.start) if backwards else (inside.stop, end)
         backwards = backwards != in_turn
+    if leads or astray:
+        steady(motion.root, *hole)
 
 
 def steps(known: np.ndarray, closed: bool, sight: int) -> tuple[int, int]:
@@ -140,7 +144,7 @@ class _Errors:
 
     Attributes:
         expected: (F,) metres, of the whole motion.
-        adds: whether errors add up; else the larger one counts.
+        together: of two errors what both make.
         carried: what the frames at both ends of what is left are expected to be off by themselves.
         told: whether all of it has been told.
         sides: what the first window from either side says that does not see the other one.
@@ -148,7 +152,7 @@ class _Errors:
 
     expected: np.ndarray
     closed: bool
-    adds: bool
+    together: np.ufunc
     carried: list[float] = field(default_factory=lambda: [0.0, 0.0])
     told: bool = False
     sides: dict[bool, np.ndarray] = field(default_factory=dict)
@@ -176,5 +180,5 @@ class _Errors:
         near, far = self.carried if all_left and self.closed else [self.carried[backwards]] * 2
         wearing = np.linspace(near, far, over.stop - over.start)
         own = said[over.start - first : over.stop - first]
-        self.expected[over] = own + wearing if self.adds else np.maximum(own, wearing)
+        self.expected[over] = self.together(own, wearing)
         self.carried[backwards] = float(self.expected[over][0 if backwards else -1])

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import solveh_banded
 
-from interpose.geometry.time import sample, sample_rotations
+from interpose.geometry.time import bending, sample, sample_rotations
 from interpose.methods.base.graph import ROUGHLY, Answer, Seen
 
 # Where more frames than ASTRAY are left, ends that know nothing of each other would stray, and the body would
@@ -21,6 +22,11 @@ ASTRAY, LEAD = 225, 60.0
 STANDS, GOES = 0.4 / 30, 0.3 / 30
 # Where somebody says where the hips go, they come back to it by e in about so many frames.
 BACK = 5.0
+# How smooth their way over the floor is made (Whittaker 1923, second differences), and how much more what
+# is known counts. In 12 gaps each of 3 and 6 s of LAFAN1's validation performer, led as he went, their pace
+# changes by at most 3.9 and 4.4 m/s^2 so (medians; 11.4 and 13.1 as the windows say it, his own 4.1 and 8.2);
+# feet slide by 4.4 and 5.0 cm/s instead of 4.4 and 5.3, and joints are off by as much.
+STIFF, FIXED = 7.0, 1e6
 # Of what follows nothing, or is followed by nothing: frames over which a pace is measured, and those of known
 # motion in which it is, over as many; who goes steadily goes in each at such a share of the fastest, and at
 # so many metres a frame. No window is slowed to less than a share.
@@ -74,6 +80,20 @@ def eased(said: np.ndarray, own: slice, motion: Seen, inside: slice) -> np.ndarr
             goes_on = 2 * motion.root[beside] - motion.root[beside + way]
             root[own] -= share * (said[first] - goes_on)
     return root
+
+
+def steady(root: np.ndarray, begin: int, end: int) -> None:
+    """Smooth the way of hips (F, 3) over the floor in frames begin to end - 1, where each window came with a
+    pace of its own; the frames beside stay, and so does how they are left and met."""
+    first, last = max(begin - 2, 0), min(end + 2, len(root))
+    bands = STIFF * bending(last - first)
+    weight = np.ones(last - first)
+    weight[: begin - first] = weight[end - first :] = FIXED
+    bands[0] += weight
+    way = root[first:last, ::2]
+    root[begin:end, ::2] = solveh_banded(bands, weight[:, None] * way, lower=True)[
+        begin - first : end - first
+    ]
 
 
 def velocity(motion: Seen, frame: int, way: int) -> np.ndarray | None:
