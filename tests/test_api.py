@@ -120,6 +120,14 @@ def test_scan_takes_paths_and_clips(data, cmu_walk):
     assert interpose.scan(data / "cmu_walk.bvh") == interpose.scan(cmu_walk)
 
 
+def roles(clip, said):
+    return replace(clip, skeleton=replace(clip.skeleton, roles=said))
+
+
+def twice(clip):
+    return [interpose.Part(clip, first, first + 10, at, ("LeftArm",)) for first, at in ((0, 55), (20, 60))]
+
+
 def test_what_does_not_fit_is_said(cmu_walk):
     seen = interpose.Observation.full(cmu_walk.slice(0, 100))
     for request, said in (
@@ -147,6 +155,11 @@ def test_what_does_not_fit_is_said(cmu_walk):
         (lambda: interpose.resample(cmu_walk, "30"), "frame rate is wrong"),
         (lambda: interpose.between(cmu_walk, 20), "nothing between the keys"),
         (lambda: interpose.fill(cmu_walk, np.array([[20, 30, 40]])), "cannot read the gap"),
+        (lambda: interpose.fill(cmu_walk.slice(0, 0), []), "no frames"),
+        (lambda: interpose.recover(cmu_walk.slice(0, 0)), "no frames"),
+        (lambda: interpose.Part(cmu_walk, 0, 10, 55, ()), "names no joints"),
+        (lambda: interpose.fill(roles(cmu_walk, {"hand": "Left"}), (20, 60)), "unknown hand"),
+        (lambda: interpose.fill(cmu_walk, (50, 80), parts=twice(cmu_walk)), "two poses of LeftArm"),
     ):
         with pytest.raises(interpose.RequestError, match=said):
             request()
@@ -174,6 +187,23 @@ def test_advice_can_be_followed_in_python(cmu_walk, ask):
 @pytest.mark.parametrize(
     ("ask", "said"),
     [
+        (lambda clip: interpose.Skeleton(["a", "b"], [None, 0], np.zeros((2, 3))), "parents="),
+        (lambda clip: interpose.Skeleton(["a", "b"], [-1, 0.9], np.zeros((2, 3))), "parents="),
+        (lambda clip: interpose.Skeleton([0, 1], [-1, 0], np.zeros((2, 3))), "names="),
+        (lambda clip: interpose.Skeleton(["a\0"], [-1], np.zeros((1, 3))), "names="),
+        (lambda clip: interpose.Skeleton(["a"], [-1], [["x", 1, 2]]), "rest_translation="),
+        (lambda clip: interpose.Skeleton(["a"], [-1], np.zeros((1, 3)), roles="x"), "roles="),
+        (lambda clip: interpose.Clip(None, [], [], 30), "skeleton=None"),
+        (lambda clip: interpose.Clip(clip.skeleton, [[1], [1, 2]], clip.translation, 30), "rotation="),
+        (lambda clip: clip.joined(clip), "several clips"),
+        (lambda clip: clip.joined([clip, "take.bvh"]), "clip='take.bvh'"),
+        (lambda clip: interpose.Observation.full("take.bvh"), "clip='take.bvh'"),
+        (lambda clip: interpose.Observation.without(clip, "1:2"), "gaps='1:2'"),
+        (lambda clip: interpose.Observation.from_nan(None, [], [], 30), "skeleton=None"),
+        (lambda clip: interpose.Observation([[1], [1, 0]], [[1]]), "an observation="),
+        (lambda clip: interpose.Gap.parse("1:2", 3), "joints=3"),
+        (lambda clip: interpose.Gap.parse("1:2", None, "take.bvh"), "clip='take.bvh'"),
+        (lambda clip: interpose.save(clip, "take.bvh", force="no"), "force='no'"),
         (lambda clip: interpose.load(None), "path=None"),
         (lambda clip: interpose.load(b"take.bvh"), "the path of a file"),
         (lambda clip: interpose.save(clip, 5), "path=5"),

@@ -169,3 +169,45 @@ def test_what_a_prompt_shows_of_a_clip_is_a_line():
     done = complete(take, seen, Linear())
     assert repr(done) == f"<Completion of {take!r}>\n{done.report}"
     assert repr(done.report) == f"<Report of linear>\n{done.report}"
+
+
+@pytest.mark.parametrize("factor", [1.2, 0.0])
+def test_rest_rotations_are_unit_quaternions(factor):
+    """And those that are rounded are made so: else every rotation below them would grow."""
+    rest = np.tile([0.6, 0.8, 0, 0], (4, 1))
+    made = replace(skeleton(), rest_rotation=1.0001 * rest).rest_rotation
+    np.testing.assert_allclose(np.linalg.norm(made, axis=1), 1.0, atol=1e-12)
+    rest[2] *= factor
+    with pytest.raises(RequestError, match="rest_rotation holds no unit quaternions"):
+        replace(skeleton(), rest_rotation=rest)
+
+
+def test_what_is_masked_is_missing(cmu_walk):
+    rotation = np.ma.masked_array(cmu_walk.rotation.copy(), mask=False)
+    rotation[50:60] = np.ma.masked
+    with pytest.raises(RequestError, match="no numbers"):
+        cmu_walk.with_motion(rotation, cmu_walk.translation)
+    seen = Observation.from_nan(cmu_walk.skeleton, rotation, cmu_walk.translation, 30)[1]
+    assert not seen.rotation[50:60].any()
+    assert seen.rotation[:50].all()
+
+
+def test_clips_whose_rotations_mean_something_else_are_not_joined(cmu_walk):
+    own = cmu_walk.skeleton
+    parents = [0 if name == "LeftArm" else parent for name, parent in zip(own.names, own.parents)]
+    rests = [*own.rest_rotation]
+    rests[own.index("LeftArm")] = np.array([0.6, 0.8, 0.0, 0.0])
+    for other in (
+        replace(own, parents=parents),
+        replace(own, rest_translation=own.rest_translation[:, [1, 2, 0]]),
+        replace(own, rest_rotation=np.array(rests)),
+    ):
+        with pytest.raises(RequestError, match="hangs otherwise"):
+            cmu_walk.joined([cmu_walk, replace(cmu_walk, skeleton=other)])
+    taller = replace(cmu_walk, skeleton=replace(own, rest_translation=1.1 * own.rest_translation))
+    assert len(cmu_walk.joined(iter([cmu_walk, taller]))) == 2 * len(cmu_walk)
+
+
+def test_no_joint_is_translated_twice():
+    with pytest.raises(RequestError, match="translated twice"):
+        Clip(skeleton(), np.tile([1.0, 0, 0, 0], (3, 4, 1)), np.zeros((3, 3, 3)), 30, (0, 1, 0))

@@ -717,7 +717,15 @@ def test_a_method_that_answers_on_other_bones_is_named(cmu_walk):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"stands": np.ones((7, 4))}, {"expected": np.ones(7)}, {"translated": (0, 1)}]
+    "wrong",
+    [
+        {"stands": np.ones((7, 4))},
+        {"expected": np.ones(7)},
+        {"translated": (0, 1)},
+        {"notes": ["so"]},
+        {"rotation": np.nan},
+        {"rotation": 1.5},
+    ],
 )
 def test_a_method_that_gives_something_else_is_named(cmu_walk, wrong):
     class Odd(type(registry.get("linear"))):  # type: ignore[misc]
@@ -725,6 +733,8 @@ def test_a_method_that_gives_something_else_is_named(cmu_walk, wrong):
 
         def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
             raw = super().complete(clip, observation, seed)
+            if "rotation" in wrong:
+                return replace(raw, clip=replace(raw.clip, rotation=wrong["rotation"] * raw.clip.rotation))
             if "translated" not in wrong:
                 return replace(raw, **wrong)
             more = np.repeat(raw.clip.translation, 2, axis=1)
@@ -846,6 +856,14 @@ def test_what_two_bodies_lack_is_found_and_recovered_of_each(duo, cmu_walk):
     mended = tasks.recover(damaged, method="small")
     assert np.array_equal(mended.clip.rotation[:, count:], rotation[:, count:])
     assert rotations.angle(mended.clip.rotation[120:123, arm], duo.rotation[120:123, arm]).max() < 0.1
+
+
+def test_the_place_of_each_of_two_bodies_is_recovered(duo):
+    translation = duo.translation.copy()
+    translation[60:90] = translation[59]
+    done = tasks.recover(duo.with_motion(duo.rotation, translation), place=True, frames=(60, 90))
+    off = np.linalg.norm(done.clip.translation - duo.translation, axis=-1).max(axis=0)
+    assert (off < 0.3).all(), off
 
 
 def test_a_path_is_the_way_of_one_body(duo):

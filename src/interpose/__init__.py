@@ -22,6 +22,8 @@ from interpose.arguments import checked
 if TYPE_CHECKING:
     from pathlib import Path
 
+    import numpy as np
+
     from interpose.clip import Clip, Skeleton
     from interpose.errors import FileError, InterposeError, NothingError, RequestError
     from interpose.finish import Completion
@@ -86,7 +88,7 @@ _HOMES = {
     "save": "interpose.formats",
 }
 
-AnyGap: TypeAlias = "Gap | str | tuple[int, int] | tuple[int, int, Sequence[str]]"
+AnyGap: TypeAlias = "Gap | str | tuple[int, int] | tuple[int, int, Sequence[str]] | np.ndarray"
 
 
 def __getattr__(name: str) -> Any:
@@ -122,7 +124,7 @@ def scan(clip: Clip | str | Path, observation: Observation | None = None) -> lis
 @checked
 def fill(
     clip: Clip | str | Path,
-    gaps: AnyGap | Sequence[AnyGap] | Observation | None = None,
+    gaps: AnyGap | Sequence[AnyGap] | np.ndarray | Observation | None = None,
     *,
     method: str | Method = "auto",
     max_gap: int | str | None = None,

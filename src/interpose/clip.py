@@ -13,7 +13,7 @@ from typing import Any, Protocol, SupportsIndex
 
 import numpy as np
 
-from interpose.errors import RequestError, unfit, unknown
+from interpose.errors import MotionError, RequestError, unfit, unknown
 from interpose.geometry import kinematics
 from interpose.geometry.time import check_rate
 
@@ -53,13 +53,20 @@ class Skeleton:
     roles: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        count = len(self.names)
         fill = object.__setattr__
-        fill(self, "names", tuple(self.names))
+        names = tuple(self.names) if isinstance(self.names, Iterable) else None
+        if isinstance(self.names, str) or names is None or not all(map(_is_name, names)):
+            raise unfit("names", self.names, 'the names of all joints, such as ["Hips", "Spine"]')
+        fill(self, "names", names)
+        fill(
+            self, "parents", joint_numbers(self.parents, "parents", "the index of each joint's parent, or -1")
+        )
+        if not isinstance(self.roles, Mapping):
+            raise unfit("roles", self.roles, 'what joints are, such as {"Hips": "pelvis"}')
+        count = len(names)
         if not count:
             raise RequestError("the skeleton has no joints", "there is nothing to move", "Name one or more.")
-        fill(self, "parents", tuple(int(parent) for parent in self.parents))
-        fill(self, "rest_translation", np.asarray(self.rest_translation, float))
+        fill(self, "rest_translation", numbers(self.rest_translation, "rest_translation"))
         if self.rest_translation.shape != (count, 3) or not np.isfinite(self.rest_translation).all():
             raise RequestError(
                 "bones do not fit",
@@ -71,13 +78,20 @@ class Skeleton:
         if self.rest_scale is None:
             fill(self, "rest_scale", np.ones(count))
         for name, shape in (("rest_rotation", (count, 4)), ("rest_scale", (count,))):
-            fill(self, name, value := np.asarray(getattr(self, name), float))
+            fill(self, name, value := numbers(getattr(self, name), name))
             if value.shape != shape or not np.isfinite(value).all():
                 raise RequestError(
                     f"{name} does not fit",
                     f"expected {shape} numbers, got {value.shape}",
                     "It has a row for each joint; leave it out where there is none.",
                 )
+        if (odd := misfit(self.rest_rotation)) is not None:
+            raise RequestError(
+                "rest_rotation holds no unit quaternions",
+                f"that of {self.names[odd[0]]} is {np.linalg.norm(self.rest_rotation[odd]):.3g} long",
+                "Divide them by their lengths; they are w, x, y, z.",
+            )
+        fill(self, "rest_rotation", of_length_one(self.rest_rotation))
         if not (self.rest_scale > 0).all():
             name = self.names[int(self.rest_scale.argmin())]
             raise RequestError(
@@ -146,18 +160,70 @@ class Skeleton:
                 above[joint] = above[parent] * self.rest_scale[parent]
         return above
 
+    def otherwise(self, other: Skeleton, moved: Iterable[int]) -> str | None:
+        """The first joint that, on a skeleton of the same joints, hangs from another one or rests pointing
+        elsewhere, so that rotations mean something else; bones may be of other lengths, and of joints that
+        are `moved` against their parents anything."""
+        one, two = self.rest_translation, other.rest_translation
+        longer = np.linalg.norm(one, axis=1) * np.linalg.norm(two, axis=1)
+        aside = np.einsum("jc,jc->j", one, two) < AWRY * longer
+        aside &= longer > SHORT**2
+        aside[list(moved)] = False
+        aside |= np.array(self.parents) != other.parents
+        aside |= np.abs(np.einsum("jc,jc->j", self.rest_rotation, other.rest_rotation)) < np.sqrt(
+            (1 + AWRY) / 2
+        )
+        return self.names[int(aside.argmax())] if aside.any() else None
 
+
+# The cosine of how far bones may point apart to be the same ones; those shorter than so many metres point
+# nowhere.
+AWRY, SHORT = 0.98, 0.01
 # How far the square of a quaternion's length may be from 1: what is stored with three decimals is nearer, and
 # is made 1 if it is not.
 UNIT, ROUNDED = 0.01, 1e-6
 
 
-def joint_numbers(joints: Iterable[SupportsIndex]) -> tuple[int, ...]:
+def joint_numbers(
+    joints: Iterable[SupportsIndex],
+    name: str = "translated",
+    kind: str = "indices of joints, such as (0, 5)",
+) -> tuple[int, ...]:
     """Indices of joints, whatever kind of numbers says them; RequestError where they are none."""
     try:
         return tuple(operator.index(joint) for joint in joints)
     except TypeError:
-        raise unfit("translated", joints, "indices of joints, such as (0, 5)") from None
+        raise unfit(name, joints, kind) from None
+
+
+def _is_name(name: object) -> bool:
+    return isinstance(name, str) and "\0" not in name
+
+
+def numbers(values: object, name: str) -> np.ndarray:
+    """Values as an array of float64; what is masked is NaN. RequestError where they are no numbers."""
+    try:
+        if isinstance(values, np.ma.MaskedArray):
+            return np.asarray(np.ma.filled(values.astype(float), np.nan))
+        return np.asarray(values, float)
+    except (TypeError, ValueError):
+        raise unfit(name, values, "an array of numbers, all rows of one length") from None
+
+
+def misfit(rotation: np.ndarray) -> tuple[int, ...] | None:
+    """Where in (..., 4) the quaternion is whose length is furthest from 1, if that is no rounding."""
+    off = np.abs(np.einsum("...c,...c->...", rotation, rotation) - 1)
+    if not off.max(initial=0.0) > UNIT:
+        return None
+    return tuple(int(i) for i in np.unravel_index(int(off.argmax()), off.shape))
+
+
+def of_length_one(rotation: np.ndarray) -> np.ndarray:
+    """Quaternions (..., 4) of which rounded ones are made unit ones; all others keep their last digit."""
+    size = np.einsum("...c,...c->...", rotation, rotation)
+    if not (rounded := np.abs(size - 1) > ROUNDED).any():
+        return rotation
+    return rotation / np.sqrt(np.where(rounded, size, 1.0))[..., None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,9 +252,11 @@ class Clip:
 
     def __post_init__(self) -> None:
         fill = object.__setattr__
+        if not isinstance(self.skeleton, Skeleton):
+            raise unfit("skeleton", self.skeleton, "a Skeleton, such as clip.skeleton")
         fill(self, "translated", joint_numbers(self.translated) or self.skeleton.roots)
-        fill(self, "rotation", np.asarray(self.rotation, float))
-        fill(self, "translation", np.asarray(self.translation, float))
+        fill(self, "rotation", numbers(self.rotation, "rotation"))
+        fill(self, "translation", numbers(self.translation, "translation"))
         joints = len(self.skeleton)
         if self.rotation.ndim != 3 or self.rotation.shape[1:] != (joints, 4):
             raise RequestError(
@@ -202,6 +270,12 @@ class Clip:
                 f"there is no joint {max(self.translated, key=abs)} to be translated",
                 f"the skeleton has {joints} joints, counted from 0",
                 "translated lists the joints whose translation is animated, by index.",
+            )
+        if twice := [joint for joint in self.translated if self.translated.count(joint) > 1]:
+            raise RequestError(
+                f"the joint {self.skeleton.names[twice[0]]} is translated twice",
+                f"translated lists the joints {', '.join(map(str, self.translated))}",
+                "Name each of them once.",
             )
         if left := [joint for joint in self.skeleton.roots if joint not in self.translated]:
             raise RequestError(
@@ -218,23 +292,19 @@ class Clip:
         check_rate(self.fps)
         fill(self, "fps", float(self.fps))
         if not (np.isfinite(self.rotation).all() and np.isfinite(self.translation).all()):
-            raise RequestError(
+            raise MotionError(
                 "the clip has values that are no numbers",
                 "a clip is always finite",
                 "Use interpose.Observation.from_nan to turn NaN into missing values first.",
             )
-        size = np.einsum("fjc,fjc->fj", self.rotation, self.rotation)
-        if np.abs(size - 1).max(initial=0.0) > UNIT:
-            frame, joint = np.unravel_index(int(np.abs(size - 1).argmax()), size.shape)
-            long = f"{size[frame, joint] ** 0.5:.3g} long"
-            raise RequestError(
+        if (odd := misfit(self.rotation)) is not None:
+            long = f"{np.linalg.norm(self.rotation[odd]):.3g} long"
+            raise MotionError(
                 "rotations are no unit quaternions",
-                f"that of {self.skeleton.names[joint]} at frame {frame} is {long}",
+                f"that of {self.skeleton.names[odd[1]]} at frame {odd[0]} is {long}",
                 "Divide them by their lengths; they are w, x, y, z.",
             )
-        if (rounded := np.abs(size - 1) > ROUNDED).any():
-            size = np.where(rounded, size, 1.0)  # all others keep their last digit
-            fill(self, "rotation", self.rotation / np.sqrt(size)[..., None])
+        fill(self, "rotation", of_length_one(self.rotation))
 
     def __len__(self) -> int:
         return self.rotation.shape[0]
@@ -306,8 +376,17 @@ class Clip:
 
         Raises RequestError for clips with other joints, or at another frame rate (lone poses have none).
         """
+        if not isinstance(clips, Iterable) or isinstance(clips, Clip):
+            raise unfit("clips", clips, "several clips, such as [one, two]")
+        clips = list(clips)
         for clip in clips:
-            if clip.skeleton.names != self.skeleton.names or clip.translated != self.translated:
+            if not isinstance(clip, Clip):
+                raise unfit("clip", clip, "a clip: interpose.load reads one")
+            mine, own = self.skeleton, clip.skeleton
+            if own.names == mine.names and (odd := mine.otherwise(own, self.translated)):
+                why = f"{odd} hangs otherwise from what is above it in one of them"
+                raise RequestError("the clips cannot be joined", why, "Retarget one: interpose.retarget.")
+            if own.names != mine.names or clip.translated != self.translated:
                 why = "their joints, or those that are translated, differ"
                 raise RequestError("the clips cannot be joined", why, "Retarget one: interpose.retarget.")
             if len(clip) > 1 and clip.fps != self.fps:

@@ -28,6 +28,10 @@ class RequestError(InterposeError):
     """The request itself is wrong: an unknown joint, a range outside the clip, an existing output."""
 
 
+class MotionError(RequestError):
+    """Numbers are none that a motion has: no numbers at all, or rotations that are none."""
+
+
 class NothingError(RequestError):
     """There is nothing to do, which is no fault where one clip of many needs nothing.
 

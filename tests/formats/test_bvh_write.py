@@ -226,13 +226,13 @@ def test_new_file(cmu_walk, tmp_path):
     )
 
 
-@pytest.mark.parametrize("spoilt", ["far", "flat", "huge", "name"])
+@pytest.mark.parametrize("spoilt", ["far", "flat", "huge", "half \ud800", "two  blanks", " one", "tab\tin"])
 def test_what_could_not_be_read_again_is_not_written(cmu_walk, tmp_path, spoilt):
     skeleton, translation = cmu_walk.skeleton, cmu_walk.translation.copy()
     if spoilt == "far":
         translation[3] = 1e30
-    elif spoilt == "name":
-        skeleton = replace(skeleton, names=(*skeleton.names[:-1], "half \ud800"))
+    elif spoilt not in ("flat", "huge"):
+        skeleton = replace(skeleton, names=(*skeleton.names[:-1], spoilt))
     else:
         size = 1e30 if spoilt == "huge" else 0.0
         skeleton = replace(skeleton, rest_translation=size * skeleton.rest_translation)

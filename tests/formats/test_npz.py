@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+from dataclasses import replace
 from zipfile import ZipFile
 
 import numpy as np
@@ -16,11 +17,12 @@ from interpose.errors import FileError, RequestError
 
 def some_clip():
     rng = np.random.default_rng(1)
+    rests = rng.standard_normal((3, 4))
     skeleton = Skeleton(
         ("Wurzel", "Häňd", "c"),
         (-1, 0, 1),
         rng.standard_normal((3, 3)),
-        rng.standard_normal((3, 4)),
+        rests / np.linalg.norm(rests, axis=-1, keepdims=True),
         np.array([1, 2, 3.0]),
     )
     turned = rng.standard_normal((5, 3, 4))
@@ -138,3 +140,18 @@ def test_options_are_not_for_npz(tmp_path):
     formats.save(some_clip(), tmp_path / "a.npz")
     with pytest.raises(RequestError, match="unit"):
         formats.load(tmp_path / "a.npz", unit="cm")
+
+
+def test_what_somebody_said_of_joints_is_kept(tmp_path):
+    clip = some_clip()
+    said = {"hand": "left", "Hips": clip.skeleton.names[0]}
+    formats.save(replace(clip, skeleton=replace(clip.skeleton, roles=said)), tmp_path / "a.npz")
+    assert formats.load(tmp_path / "a.npz").skeleton.roles == said
+    assert formats.load(tmp_path / "a.npz", roles={"hand": "right"}).skeleton.roles == {"hand": "right"}
+
+
+def test_what_is_too_far_to_be_read_again_is_not_written(tmp_path):
+    clip = some_clip()
+    with pytest.raises(RequestError, match="cannot write this motion"):
+        formats.save(clip.with_motion(clip.rotation, clip.translation + 1e10), tmp_path / "a.npz")
+    assert not list(tmp_path.iterdir())

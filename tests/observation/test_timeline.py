@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.skeletons.rigs import six_channels
 
+import interpose
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
 from interpose.formats import load
@@ -59,6 +60,16 @@ def test_every_frame_is_kept(cmu_walk, run, jump):
         # Joints turn as they did; heights go by the size of the body alone.
         assert np.allclose(fitted.rotation, clip.rotation)
         assert np.allclose(_piece(line, number).root[:, 1], scale * clip.root[:, 1], atol=1e-6)
+
+
+def test_a_smaller_body_on_another_rig_is_said_to_be_scaled(cmu_walk):
+    other = replace(cmu_walk.skeleton, rest_translation=0.7 * cmu_walk.skeleton.rest_translation)
+    rig = replace(other, names=tuple(f"mixamorig:{name}" for name in other.names))
+    for skeleton in (other, rig):
+        small = cmu_walk.with_motion(cmu_walk.rotation, 0.7 * cmu_walk.translation)
+        small = replace(small, skeleton=skeleton, source=None)
+        done = interpose.stitch([cmu_walk, small], 10, method="linear")
+        assert done.clips[1].scale == pytest.approx(1 / 0.7)
 
 
 def test_the_same_rig_under_another_namespace_is_the_same_rig(cmu_walk):

@@ -353,7 +353,8 @@ def _weighed(signal: np.ndarray, noise: float, moment: float) -> np.ndarray:
     left = ((stages - signal) ** 2).sum(axis=-1) / noise**2
     risk = ndimage.gaussian_filter1d(left, moment, axis=1, mode="nearest") + 6.0 * np.array(through)[:, None]
     risk *= np.sqrt(2 * np.pi) * moment
-    share = np.exp((risk.min(axis=0) - risk) / TEMPERATURE)
+    with np.errstate(under="ignore"):  # what is far worse has no share
+        share = np.exp((risk.min(axis=0) - risk) / TEMPERATURE)
     return np.einsum("lf,lfd->fd", share / share.sum(axis=0), stages)
 
 

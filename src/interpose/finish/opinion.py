@@ -3,7 +3,7 @@ what it gives is checked, positions are solved for rotations, and what is observ
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import InterposeError, RequestError
+from interpose.errors import InterposeError, MotionError, RequestError
 from interpose.finish import seams
 from interpose.finish.solve import solve, solve_error
 from interpose.finish.span import Span
@@ -29,6 +29,7 @@ NOWHERE = 1e4
 SAME = 1e-4
 # Frames solved at once.
 CHUNK = 4096
+TELL = "Tell those who made it."
 
 
 def wipe(clip: Clip, observation: Observation) -> Clip:
@@ -75,13 +76,14 @@ def _blamed(method: Method) -> Iterator[None]:
     """What goes wrong within is the fault of a method: RequestError names it."""
     try:
         yield
+    except MotionError as error:
+        why = f"{error.what}: {error.why}"
+        raise RequestError(f"the method {method.name} does not work", why, TELL) from error
     except (InterposeError, MemoryError, OSError):
         raise  # no fault of its own
     except Exception as error:
         why = f"it failed with {type(error).__name__}: {error}"
-        raise RequestError(
-            f"the method {method.name} does not work", why, "Tell those who made it."
-        ) from error
+        raise RequestError(f"the method {method.name} does not work", why, TELL) from error
 
 
 def second(
@@ -112,9 +114,11 @@ def _sound(raw: Any, clip: Clip, name: str) -> None:
         problem = f"it says of {np.shape(raw.stands)} feet that they stand, of ({len(clip)}, 4)"
     elif raw.expected is not None and np.shape(raw.expected) != (len(clip),):
         problem = f"it expects errors {np.shape(raw.expected)} of {len(clip)} frames"
+    elif not isinstance(raw.notes, Mapping):
+        problem = f"its notes are a {type(raw.notes).__name__}, no mapping"
     else:
         return
-    raise RequestError(f"the method {name} does not work", problem, "Tell those who made it.")
+    raise RequestError(f"the method {name} does not work", problem, TELL)
 
 
 def _strange(joints: Iterable[object], count: int) -> list[object]:

@@ -12,7 +12,7 @@ from itertools import chain, repeat
 import numpy as np
 import scipy
 
-from interpose.clip import Clip, Skeleton
+from interpose.clip import Clip, Skeleton, numbers
 from interpose.errors import RequestError, is_number
 from interpose.finish import feet
 from interpose.finish.hinges import Hinges
@@ -78,9 +78,8 @@ def asked(clip: Clip, observation: Observation, first: int = 0) -> tuple[Pin, ..
                 "Give one of them, a row for each frame.",
             )
         for value, width in ((pin.position, 3), (pin.orientation, 4)):
-            if value is not None and not (
-                np.shape(value) == (len(frames), width) and np.isfinite(value).all()
-            ):
+            rows = None if value is None else numbers(value, f"the pin of {pin.joint}")
+            if rows is not None and not (rows.shape == (len(frames), width) and np.isfinite(rows).all()):
                 raise RequestError(
                     f"the pin of {pin.joint} does not fit",
                     f"{len(frames)} frames need as many rows of {width} finite numbers",

@@ -128,6 +128,8 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
     if not isinstance(clip, Clip):
         hint = "Give its .clip." if isinstance(getattr(clip, "clip", None), Clip) else "Give a clip."
         raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
+    if not isinstance(force, bool | np.bool_ | int):
+        raise unfit("force", force, "True or False")
     path = _path(path)
     chosen = _format(path)
     if not len(clip):

@@ -62,7 +62,7 @@ def check_values(values: np.ndarray) -> None:
     """RequestError for numbers that no file of text is read with again."""
     if not np.abs(values).max(initial=0.0) <= VALUE_LIMIT:
         why = f"some of its numbers would be beyond {VALUE_LIMIT:g}, or are none"
-        raise RequestError("cannot write this motion", why, "Bring it nearer to the origin, or write .npz.")
+        raise RequestError("cannot write this motion", why, "Bring it nearer to the origin.")
 
 
 def write_frames(source: TextSource, frames: int, put: Put, stream: BinaryIO, line_end: bytes) -> None:

@@ -1,12 +1,13 @@
 """interpose's own arrays in NumPy's .npz: every value of a clip, exactly, without pickle.
 
 Arrays: version; names (J,) text; parents (J,); rest_translation (J, 3), rest_rotation (J, 4),
-rest_scale (J,); rotation (F, J, 4); translation (F, K, 3); translated (K,); fps.
-Metres, Y up, quaternions (w, x, y, z).
+rest_scale (J,); rotation (F, J, 4); translation (F, K, 3); translated (K,); fps; and, where somebody said
+something about the joints, roles, as JSON in a text. Metres, Y up, quaternions (w, x, y, z).
 """
 
 from __future__ import annotations
 
+import json
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import BinaryIO
 import numpy as np
 
 from interpose.clip import Clip, Skeleton
-from interpose.errors import FileError, InterposeError
+from interpose.errors import FileError, InterposeError, RequestError
 from interpose.formats.text import VALUE_LIMIT
 
 VERSION = 1
@@ -56,7 +57,7 @@ def read(path: Path, roles: Mapping[str, str] | None = None) -> Clip:
                 np.asarray(held["rest_translation"], float).reshape(count, 3),
                 np.asarray(held["rest_rotation"], float).reshape(count, 4),
                 np.asarray(held["rest_scale"], float).reshape(count),
-                roles or {},
+                roles or (json.loads(str(file["roles"])) if "roles" in file.files else {}),
             )
             translated = tuple(int(joint) for joint in held["translated"])
             once = len(set(translated)) == len(translated)
@@ -64,15 +65,11 @@ def read(path: Path, roles: Mapping[str, str] | None = None) -> Clip:
                 raise FileError(what, f"its translated joints are {translated}", again)
             if not len(held["rotation"]):
                 raise FileError(what, "its motion has no frames", again)
-            rest = skeleton.rest_translation, skeleton.rest_rotation, skeleton.rest_scale
-            if not all(np.isfinite(values).all() for values in rest):
-                raise FileError(what, "its skeleton has values that are no numbers", again)
+            rest = _rest(skeleton)
             motion = held["rotation"], held["translation"]
             # What is not known may be no number; what is above is damage, and would overflow later.
             if any(np.nanmax(np.abs(values), initial=0.0) > VALUE_LIMIT for values in (*rest, *motion)):
                 raise FileError(what, f"it has values beyond {VALUE_LIMIT:g}", again)
-            if not np.linalg.norm(skeleton.rest_rotation, axis=1).all():
-                raise FileError(what, "its rest_rotation has rotations that are zero", again)
             return Clip(skeleton, *motion, float(held["fps"]), translated, path.stem)
     except FileError:
         raise
@@ -88,8 +85,14 @@ def read(path: Path, roles: Mapping[str, str] | None = None) -> Clip:
 
 
 def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
-    """Write all arrays of the clip; returns no notes, as nothing is lost but a text format's layout."""
+    """Write all arrays of the clip; returns no notes, as nothing is lost but a text format's layout.
+
+    Raises RequestError for values that are not read again.
+    """
     skeleton = clip.skeleton
+    if any(np.abs(values).max(initial=0.0) > VALUE_LIMIT for values in (clip.translation, *_rest(skeleton))):
+        why = f"it has values beyond {VALUE_LIMIT:g} metres"
+        raise RequestError("cannot write this motion", why, "Bring it nearer to the origin.")
     np.savez(
         stream,
         allow_pickle=False,
@@ -103,5 +106,10 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
         translation=clip.translation,
         translated=np.array(clip.translated),
         fps=np.array(float(clip.fps)),
+        roles=np.array(json.dumps(dict(skeleton.roles))),
     )
     return ()
+
+
+def _rest(skeleton: Skeleton) -> tuple[np.ndarray, ...]:
+    return skeleton.rest_translation, skeleton.rest_rotation, skeleton.rest_scale

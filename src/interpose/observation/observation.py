@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from interpose.clip import Clip, Skeleton, joint_numbers
+from interpose.clip import Clip, Skeleton, joint_numbers, numbers
 from interpose.errors import RequestError, is_number, unfit
 from interpose.skeletons.performers import meant
 
@@ -51,7 +51,7 @@ class Gap:
                 )
 
     def __len__(self) -> int:
-        return self.stop - self.start
+        return max(self.stop - self.start, 0)
 
     def __str__(self) -> str:
         return f"{self.start}:{self.stop}" + (f" {','.join(self.joints)}" if self.joints else "")
@@ -66,23 +66,30 @@ class Gap:
             raise unfit("gap", text, 'a text, such as "120:160"')
         first, colon, last = text.strip().partition(":")
 
+        if not isinstance(clip, Clip | None):
+            raise unfit("clip", clip, "a clip: interpose.load reads one")
         try:
             if not colon or (clip is not None and not first + last):
                 raise ValueError
             if clip is None:
-                return cls(int(first), int(last), joints)
-            start = frame_at(first, clip.fps) if first else 0
-            return cls(start, frame_at(last, clip.fps) if last else len(clip), joints)
+                start, stop = int(first), int(last)
+            else:
+                start = frame_at(first, clip.fps) if first else 0
+                stop = frame_at(last, clip.fps) if last else len(clip)
         except ValueError:
             raise RequestError(
                 f"cannot read the gap {text!r}",
                 "a gap is a range of frames START:STOP, and STOP is the first frame after it",
                 "Write 120:160 for the frames 120 to 159, or 4s:5.3s.",
             ) from None
+        return cls(start, stop, joints)
 
     def check(self, frames: int) -> Gap:
         """Itself, or RequestError when the range is backwards, empty or outside a clip of `frames` frames."""
         fix = f"The clip has frames 0 to {frames - 1}; write START:STOP with 0 <= START < STOP <= {frames}."
+        if not frames:
+            why = "the clip has no frames"
+            raise RequestError(f"there is no gap {self.start}:{self.stop}", why, "Give a clip that has some.")
         if self.stop <= self.start:
             why = "it stops where it starts" if self.stop == self.start else "it stops before it starts"
             raise RequestError(f"the gap {self.start}:{self.stop} is empty", why, fix)
@@ -168,9 +175,24 @@ class Pin:
         return replace(self, frames=frames[inside] - start, position=position, orientation=orientation)
 
 
+def _of(gaps: Iterable[Gap], clip: Clip) -> list[Gap]:
+    """Gaps of a clip; RequestError for what is none, or lies outside."""
+    if not isinstance(gaps, Iterable) or isinstance(gaps, str):
+        raise unfit("gaps", gaps, 'a list of Gaps, such as [Gap.parse("120:160")]')
+    gaps = list(gaps)
+    for gap in gaps:
+        if not isinstance(gap, Gap):
+            raise unfit("gap", gap, 'a Gap, such as Gap.parse("120:160")')
+        gap.check(len(clip))
+    return gaps
+
+
 def _flags(values: object) -> np.ndarray:
     """True where something is known; RequestError for what does not say so, as a tracker's confidences."""
-    flags = np.asarray(values)
+    try:
+        flags = np.asarray(values)
+    except ValueError:
+        raise unfit("an observation", values, "arrays (frames, joints) of True and False") from None
     if flags.dtype != bool and not (flags.dtype.kind in "iuf" and np.isin(flags, (0, 1)).all()):
         raise RequestError(
             "an observation says of each value whether it is known",
@@ -202,7 +224,10 @@ class Observation:
         fill = object.__setattr__
         fill(self, "rotation", _flags(self.rotation))
         fill(self, "translation", _flags(self.translation))
-        fill(self, "pins", (self.pins,) if isinstance(self.pins, Pin) else tuple(self.pins or ()))
+        pins = self.pins or ()
+        if not isinstance(pins, Iterable | Pin):
+            raise unfit("pins", pins, "Pins")
+        fill(self, "pins", (pins,) if isinstance(pins, Pin) else tuple(pins))
         if wrong := [pin for pin in self.pins if not isinstance(pin, Pin)]:
             raise unfit("pins", wrong[0], "Pins")
         if self.rotation.shape != self.translation.shape or self.rotation.ndim != 2:
@@ -230,6 +255,8 @@ class Observation:
     @classmethod
     def full(cls, clip: Clip) -> Observation:
         """Everything is known."""
+        if not isinstance(clip, Clip):
+            raise unfit("clip", clip, "a clip: interpose.load reads one")
         shape = clip.rotation.shape[:2]
         return cls(np.ones(shape, bool), np.ones(shape, bool))
 
@@ -242,12 +269,7 @@ class Observation:
         """
         seen, several = cls.full(clip), meant(clip.skeleton)
         bodies = several or [range(len(clip.skeleton))]
-        if not isinstance(gaps, Iterable) or isinstance(gaps, str):
-            raise unfit("gaps", gaps, 'a list of Gaps, such as [Gap.parse("120:160")]')
-        for gap in gaps:
-            if not isinstance(gap, Gap):
-                raise unfit("gap", gap, 'a Gap, such as Gap.parse("120:160")')
-            gap.check(len(clip))
+        for gap in _of(gaps, clip):
             frames = slice(gap.start, gap.stop)
             lost = {clip.skeleton.index(name) for name in gap.joints or ()}
             seen.rotation[frames, [*lost]] = False
@@ -261,8 +283,8 @@ class Observation:
     def without(cls, clip: Clip, gaps: Iterable[Gap]) -> Observation:
         """Everything is known but frames that nobody has recorded: nothing of any, whoever is meant."""
         seen = cls.full(clip)
-        for gap in gaps:
-            frames = slice(gap.check(len(clip)).start, gap.stop)
+        for gap in _of(gaps, clip):
+            frames = slice(gap.start, gap.stop)
             seen.rotation[frames] = False
             seen.translation[frames, list(clip.translated)] = False
         return seen
@@ -281,8 +303,13 @@ class Observation:
         rotation: (F, J, 4); translation: (F, K, 3) as in Clip. A quaternion, or a vector, with a NaN in it is
         missing as a whole: of a place of which two coordinates are known nothing is.
         """
+        if not isinstance(skeleton, Skeleton):
+            raise unfit("skeleton", skeleton, "a Skeleton, such as clip.skeleton")
         translated = joint_numbers(translated) or skeleton.roots
-        rotation, translation = np.array(rotation, float), np.array(translation, float)
+        rotation, translation = (
+            numbers(rotation, "rotation").copy(),
+            numbers(translation, "translation").copy(),
+        )
         if not all(0 <= joint < len(skeleton) for joint in translated):
             raise RequestError(
                 f"there is no joint {max(translated, key=abs)} to be translated",

@@ -41,6 +41,9 @@ class Part:
         for side in ("start", "stop", "at"):
             fill(self, side, frame_number(getattr(self, side)))
         fill(self, "joints", joint_names(self.joints))
+        if not self.joints:
+            why = "it names no joints"
+            raise RequestError("nothing is laid into the clip", why, 'Name some: ("LeftArm", "LeftHand").')
         if not isinstance(self.clip, Clip):
             raise unfit("clip", self.clip, "a clip: interpose.load reads one")
 
@@ -62,6 +65,9 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
         to = slice(part.at, part.at + part.stop - part.start)
         for name in part.joints:
             here, there = clip.skeleton.index(name), part.clip.skeleton.index(name)
+            if (known[to, here] > observation.rotation[to, here]).any():
+                why = f"two parts give it in the frames {to.start}:{to.stop}, or in some of them"
+                raise RequestError(f"there are two poses of {name}", why, "Give one of them.")
             rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
             known[to, here] = True
         _hung(rotation, clip, observation, part)

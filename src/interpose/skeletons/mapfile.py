@@ -14,7 +14,7 @@ from pathlib import Path
 
 from interpose.errors import FileError, unknown
 from interpose.skeletons.canonical import JOINTS
-from interpose.skeletons.mapping import Mapping
+from interpose.skeletons.mapping import HANDS, Mapping
 
 EXAMPLE = '{"joints": {"Hips": "pelvis", "LeftToe": ""}}'
 
@@ -42,7 +42,7 @@ def read_map(path: str | Path) -> dict[str, str]:
     for key in ("root", "hand"):
         if content.get(key) is not None:
             roles[key] = content[key]
-    if roles.get("hand") not in (None, "left", "right"):
+    if roles.get("hand") not in (None, *HANDS):
         raise FileError(f"the map {path} is wrong", "a hand is left or right", 'Write {"hand": "left", ...}')
     for name, own in roles.items():
         if name not in (*JOINTS, "root", "hand"):

@@ -17,6 +17,7 @@ from interpose.skeletons.topology import guess
 # How a joint is found, the surest way first: somebody said so, its own name says so, its place among named
 # joints does, or the shape of the skeleton where no name helps.
 HOW = ("given", "name", "chain", "shape")
+HANDS = ("left", "right")
 TRUNK = ("Hips", "Spine", "Spine1", "Spine2", "Neck", "Head")
 # Where the joints of the trunk lie along it, in metres of the canonical body.
 ALONG = np.cumsum([np.linalg.norm(BONES[JOINTS.index(name)]) for name in TRUNK])
@@ -184,6 +185,8 @@ def _given(skeleton: Skeleton) -> dict[str, int | None]:
     """What somebody said: canonical joint to own joint, None for one that is not there."""
     given: dict[str, int | None] = {}
     for name, own in skeleton.roles.items():
+        if name == "hand" and own and own not in HANDS:
+            raise unknown("hand", own, HANDS)
         if name in ("root", "hand"):
             continue
         if name not in JOINTS:

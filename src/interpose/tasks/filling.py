@@ -86,6 +86,9 @@ def fill(
     brief = momentary(clip, observation) if piecemeal else None
     if brief:
         clip, observation = mended(clip, observation, brief)
+    if not len(clip):
+        what = f"{clip.name or 'the clip'} has no frames"
+        raise RequestError(what, "there is nothing in it to complete", "Give one that has some.")
     if not (observation.rotation.any() or observation.translation[:, list(clip.translated)].any()):
         raise RequestError(
             "there is nothing to go by",

@@ -59,6 +59,14 @@ def recover(
         raise RequestError(
             "there is no joint to recover", "the list of them is empty", "Leave it out to find what is lost."
         )
+    if joints is None and (several := meant(clip.skeleton)):
+        bodies: dict[Joints, Completion] = {}
+        for i, body in enumerate(several):
+            along = None if progress is None else partial(_along, progress, i, len(several))
+            bodies[body] = recover(clip_of(clip, body), None, (start, stop), method, seed, along, place)
+        done = assembled(clip, bodies)
+        gaps = [replace(gap, number=number) for number, gap in enumerate(done.report.gaps, 1)]
+        return replace(done, report=replace(done.report, gaps=gaps))
     if place:
         if joints is not None:
             raise RequestError(
@@ -78,14 +86,6 @@ def recover(
             # The first frame counts that belongs to the motion.
             seen.translation[min({*range(stop)} - {*strays(clip)}, default=0) :][:1] = True
         return fill(clip, seen, method, seed=seed, progress=progress)
-    if joints is None and (several := meant(clip.skeleton)):
-        bodies: dict[Joints, Completion] = {}
-        for i, body in enumerate(several):
-            along = None if progress is None else partial(_along, progress, i, len(several))
-            bodies[body] = recover(clip_of(clip, body), None, (start, stop), method, seed, along)
-        done = assembled(clip, bodies)
-        gaps = [replace(gap, number=number) for number, gap in enumerate(done.report.gaps, 1)]
-        return replace(done, report=replace(done.report, gaps=gaps))
     if joints is None:
         swapped = swaps(clip, start, stop)
         sides = put_back(clip, swapped)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from interpose.finish.report import GapReport
 from interpose.geometry.measures import acceleration
 from interpose.methods.protocol import Method
 from interpose.observation import Observation, gait, timeline
-from interpose.skeletons import find_humanoid
+from interpose.skeletons import find_humanoid, find_mapping
 from interpose.tasks.filling import fill
 from interpose.tasks.windows import raw_part
 
@@ -80,7 +80,8 @@ def stitch(
     Raises:
         RequestError: what `on_rig_of`, `timeline.lay` and `fill` refuse.
     """
-    clips = [on_rig_of(clip, clips[0]) if len(clip) else clip for clip in clips]
+    given = list(clips)
+    clips = [on_rig_of(clip, given[0]) if len(clip) else clip for clip in given]
     line = timeline.lay(clips, frames, align, loop)
     if isinstance(frames, str) and frames == "auto" and align:
         lengths, whys = _tried(line, method, action, seed)
@@ -104,9 +105,17 @@ def stitch(
         lambda: raw_part(done.raw, 0, len(clip)),
         provenance,
         done.report,
-        clips=line.laid,
+        clips=[_scaled(*one, given[0]) for one in zip(line.laid, given, clips)],
         loop=closing,
     )
+
+
+def _scaled(laid: timeline.Laid, given: Clip, brought: Clip, first: Clip) -> timeline.Laid:
+    """Where a clip lies, which was `brought` onto the rig of the first one, or is as it was given."""
+    if brought is given:
+        return laid
+    theirs, mine = (find_mapping(clip.skeleton).scale for clip in (given, first))
+    return replace(laid, scale=laid.scale * theirs / mine)
 
 
 @dataclass(frozen=True)

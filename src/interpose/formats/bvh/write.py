@@ -16,7 +16,7 @@ from interpose.formats.text import DECIMALS
 from interpose.geometry import rotations
 
 CENTIMETRE = 0.01
-UNWRITTEN = {*"{}\n\r"}  # in names
+UNWRITTEN = {*"{}"}  # in names
 
 
 def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def _write_new(clip: Clip, stream: BinaryIO) -> None:
     if bad := [name for name in skeleton.names if not _fits(name)]:
         raise RequestError(
             f"cannot write a joint called {bad[0]!r} as BVH",
-            "names in it are one line of text, and hold no braces",
+            "names in it are one line of text, with single blanks inside of them and no braces",
             "Rename it, or write .npz.",
         )
     offsets = skeleton.rest_translation * skeleton.scale_above[:, None] / CENTIMETRE
@@ -162,7 +162,8 @@ def _write_new(clip: Clip, stream: BinaryIO) -> None:
 def _fits(name: str) -> bool:
     """Whether BVH can hold a joint's name."""
     lone = any("\ud800" <= letter <= "\udfff" for letter in name)  # halves of letters are no text
-    return bool(name) and not lone and not UNWRITTEN & {*name}
+    clean = name == " ".join(name.split()) and all(letter >= " " for letter in name)
+    return bool(name) and clean and not lone and not UNWRITTEN & {*name}
 
 
 def _numbers(vector: np.ndarray) -> str:
