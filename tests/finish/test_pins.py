@@ -205,6 +205,54 @@ def test_a_hand_and_its_forearm_are_both_turned_as_pinned(cmu_walk, order):
         assert rotations.angle(done[cmu_walk.skeleton.index(pin.joint)], pin.orientation[0]) < 1e-3
 
 
+def test_places_and_turns_that_go_together_are_both_met(cmu_walk):
+    """Of six joints as they were: nearer to the truth than places alone lead, and no one is torn away."""
+    frames = np.arange(GAP.start, GAP.stop)
+    turned, placed = cmu_walk.kinematics()
+    off = []
+    for both in (False, True):
+        pinned = []
+        for name in ("Hips", "Head", "LeftHand", "RightHand", "LeftFoot", "RightFoot"):
+            joint = cmu_walk.skeleton.index(name)
+            pinned.append(Pin(name, frames, placed[frames, joint], turned[frames, joint] if both else None))
+        done = tasks.fill(cmu_walk, [GAP], "small", pins=pinned).clip
+        assert max(far for *_, far in pins.missed(done, tuple(pinned))) < 1e-3
+        off.append(np.linalg.norm(done.positions() - cmu_walk.positions(), axis=-1)[frames].mean())
+    assert off[1] < 0.9 * off[0]
+
+
+@pytest.mark.parametrize("about", ["X", "Y"])
+def test_feet_stay_where_hips_are_turned(cmu_walk, about):
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    there = rotations.multiply(rotations.about(about, np.radians(25.0)), free.kinematics()[0][85, 0])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[Pin("Hips", [85], None, [there])]).clip
+    assert rotations.angle(done.kinematics()[0][85, 0], there) < np.radians(0.1)
+    ends = feet.ends(done.skeleton)
+    assert np.linalg.norm(done.positions()[85, ends] - free.positions()[85, ends], axis=-1).max() < 0.03
+
+
+def test_a_neck_takes_its_share_of_how_a_head_turns(cmu_walk):
+    head, neck = (find_mapping(cmu_walk.skeleton)[name] for name in ("Head", "Neck"))
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    there = rotations.multiply(rotations.about("Y", np.radians(60.0)), free.kinematics()[0][85, head])
+    pin = Pin(cmu_walk.skeleton.names[head], [85], None, [there])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip
+    assert rotations.angle(done.kinematics()[0][85, head], there) < np.radians(0.1)
+    own = [np.degrees(rotations.angle(done.rotation[85, j], free.rotation[85, j])) for j in (head, neck)]
+    assert max(own) < 35
+
+
+def test_all_of_a_body_goes_along_whose_hips_are_pinned_far_away(cmu_walk):
+    """As after an end that nothing follows: it is not torn apart."""
+    free = tasks.forecast(cmu_walk.slice(0, 100), 40, method="spline").clip
+    seen = Observation.from_gaps(free, [Gap(100, 140)])
+    frames = np.arange(100, 140)
+    aside = np.linspace(0, 1, 40)[:, None] * [1.5, 0.0, 0.0]
+    done = tasks.fill(free, seen, "spline", pins=[Pin("Hips", frames, free.root[frames] + aside)]).clip
+    here, there = (one.positions()[139] - one.root[139] for one in (free, done))
+    assert np.linalg.norm(here - there, axis=-1).max() < 0.2
+
+
 @pytest.mark.parametrize("height", [0.3, 0.1])
 def test_who_reaches_down_bends_as_people_do(cmu_walk, height):
     """In hips and knees: a spine that folds up leaves them where they were."""
@@ -369,6 +417,12 @@ def test_pins_are_cut_with_their_observation(cmu_walk):
     assert pin.frames.tolist() == [5]
     assert seen.slice(0, 80).pins == ()
     assert pins.meet(cmu_walk, Observation.full(cmu_walk), seen.pins) is cmu_walk
+
+
+def test_one_joint_turned_in_two_ways_is_refused(cmu_walk):
+    turns = [Pin("LeftHand", [85], None, [[1.0, 0, 0, 0]]), Pin("LeftHand", [85], None, [[0.6, 0.8, 0, 0]])]
+    with pytest.raises(RequestError, match="two turns at frame 85"):
+        tasks.fill(cmu_walk, [GAP], "spline", pins=turns)
 
 
 def test_one_joint_at_two_places_is_refused(cmu_walk):

@@ -142,3 +142,17 @@ def test_without_time_nobody_steps(standing):
     known = Observation.from_gaps(clip, [Gap(*SPAN)])
     assert shuffling.stepping(clip, known, SPAN, 1.0) is not None
     assert shuffling.stepping(clip, known, SPAN, 2.1) is None
+
+
+def test_a_heel_comes_down_when_it_did(standing):
+    """Not in one frame, when the toe has got where it stands, nor does it hang there until the end."""
+    time = np.arange(61.0)
+    foot = np.zeros((61, 2, 3))
+    foot[:, 1, 0] = 0.4 * np.clip(time / 30, 0, 1)
+    foot[:, 0, 0] = foot[:, 1, 0] - 0.15
+    foot[:, 0, 1] = 0.08 + 0.06 * np.clip((60 - time) / 30, 0, 1)
+    step = shuffling.Step(0, 0, 61, (0.0, 1.0), 15.0, 12.0, (0.0, 0.0))
+    path = shuffling._way(standing, foot, [step])
+    np.testing.assert_allclose(path[30:, 0, 1], foot[30:, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(path[30:, 1], foot[30:, 1], atol=1e-9)
+    assert np.linalg.norm(np.diff(path[:, 0] - path[:, 1], axis=0), axis=1).max() < 0.01

@@ -194,3 +194,18 @@ def test_a_foot_that_is_on_its_way_at_a_key_does_not_stand_from_there_on(standin
     moving = after.with_motion(rotation, after.translation)
     seen = Observation.from_gaps(moving, [Gap(1, 30), Gap(31, len(moving))])
     assert stepping.stepped(moving, seen, (1, 30)) is None
+
+
+def test_who_turns_does_not_wait_on_tiptoe(standing):
+    """A heel that is up at a key comes down after it, and rises before the next one."""
+    clip, _ = keys(standing, 60, 90)
+    feet_there = clip.positions()[[0, 60]][:, feet.pairs(clip.skeleton)]
+    flat = feet_there[..., 0, 1].copy()
+    feet_there[1, :, 0, 1] += 0.06
+    path = stepping._steps(stepping.Turn(feet_there, np.pi / 2), clip, (1, 60))
+    assert path is not None
+    off = path[..., 0, 1] - flat[0]
+    assert off[-1].min() > 0.05
+    for leg in range(2):
+        landed = np.flatnonzero(np.linalg.norm(np.diff(path[:, leg, 1, ::2], axis=0), axis=1) > 1e-6)[-1] + 2
+        assert np.abs(off[landed : 59 - round(stepping.HEELS * clip.fps), leg]).max(initial=0.0) < 0.002

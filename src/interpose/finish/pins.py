@@ -16,13 +16,15 @@ from interpose.clip import Clip, Skeleton, numbers
 from interpose.errors import RequestError, is_number
 from interpose.finish import feet
 from interpose.finish.hinges import Hinges
-from interpose.finish.solve import BLOCK, Axes, refine, refine_steadily
-from interpose.finish.windows import envelope, spread
+from interpose.finish.solve import BLOCK, Axes, Bounds, refine, refine_steadily
+from interpose.finish.windows import envelope, ramp, spread
 from interpose.geometry import rotations
+from interpose.geometry.ground import FLOOR
 from interpose.geometry.time import runs
 from interpose.methods.bodies import no_humanoid
 from interpose.observation import Observation, Pin
 from interpose.skeletons import find_mapping
+from interpose.skeletons.mapping import TRUNK
 
 # How much the place of every other joint counts beside a pin, round by round: first all give way together,
 # then the pins alone decide; and how many times more those of feet do.
@@ -32,10 +34,15 @@ SHARES, FEET = (3e-2, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6), 30.0
 HINGED = 0.3
 # Radians by which a joint that is known to be turned is turned otherwise than a pin says.
 TURNED = 0.01
-# Of how a pinned hand turns about its forearm, the share that the forearm does.
-FOREARM = 0.5
+# Of how a pinned hand turns about its forearm, or a pinned head in all, the share that forearm or neck does.
+ALSO = 0.5
+# Radians by which hips are turned while feet stay where they are; beyond, they go along.
+FEET_TURN = np.radians(60.0)
 # Seconds over which a joint slows down to a place that it is to hold while the body goes on.
 LEAD = 0.3
+# Metres over the floor by which a trunk is pinned elsewhere from which on the whole body goes along, and by
+# twice as much all the way: below, its feet stay where they stand.
+ALONG = 0.3
 # Metres that a pin is approached by in a round, and the shortest such step; what counts as nearer; and rounds
 # after those at most.
 STEP, SHORT, STILL, ROUNDS = 0.25, 0.005, 1e-6, 40
@@ -121,7 +128,18 @@ def asked(clip: Clip, observation: Observation, first: int = 0) -> tuple[Pin, ..
                 rows = np.asarray(values)[~told]
                 found.append(Pin(pin.joint, frames[~told], tolerance=pin.tolerance, **{kind: rows}))
     places: dict[tuple[str, int], np.ndarray] = {}
+    turns: dict[tuple[str, int], np.ndarray] = {}
     for pin in observation.pins:
+        for frame, turn in zip(pin.frames, () if pin.orientation is None else pin.orientation):
+            other = turns.setdefault((pin.joint, int(frame)), np.asarray(turn))
+            if (
+                angle := float(rotations.angle(*map(rotations.normalize, (np.asarray(turn), other))))
+            ) > TURNED:
+                raise RequestError(
+                    f"{pin.joint} is pinned to two turns at frame {first + frame}",
+                    f"they are {np.degrees(angle):.0f} degrees apart, and it can be turned by one of them",
+                    "Leave one of the pins out.",
+                )
         for frame, place in zip(pin.frames, () if pin.position is None else pin.position):
             other = places.setdefault((pin.joint, int(frame)), np.asarray(place))
             if (apart := float(np.linalg.norm(place - other))) > pin.tolerance:
@@ -260,18 +278,54 @@ def _meet(
     turned = [pin for pin in pins if pin.orientation is not None]
     turned.sort(key=lambda pin: clip.skeleton.index(pin.joint))
     fixed = {clip.skeleton.index(pin.joint) for pin in turned}
-    # Turning a joint moves what hangs on it, so where both are asked for both are done twice.
-    for _ in range(2 if placed and turned else 1):
-        if placed:
-            clip = _place(clip, known, placed, edges, down, axes)
+    stays = _staying(clip, turned, placed)
+    # Turning a joint moves what hangs on it, so where both are asked for both are done twice, and what is
+    # turned by then stays so.
+    rounds: list[tuple[list[Pin], np.ndarray | None]] = [(placed, None)]
+    if turned and (placed or stays):
+        rounds.append((placed + stays, _held(clip, known, turned)))
+    for there, held in rounds:
+        if there:
+            clip = _place(clip, known, there, edges, down, axes, held)
             down = np.zeros_like(down)
         for pin in turned:
             clip = _turn(clip, known, pin, edges, fixed)
     return clip
 
 
+def _staying(clip: Clip, turned: list[Pin], placed: list[Pin]) -> list[Pin]:
+    """Pins of feet where they are, if hips that they hang on are to be turned by less than FEET_TURN."""
+    skeleton, (now, at) = clip.skeleton, clip.kinematics()
+    pinned, found = {pin.joint for pin in placed}, []
+    for foot in dict.fromkeys(feet.pairs(skeleton).ravel().tolist()):
+        above = [pin for pin in turned if skeleton.index(pin.joint) in skeleton.ancestors(foot)]
+        off = [rotations.angle(now[pin.frames, skeleton.index(pin.joint)], pin.orientation) for pin in above]
+        # A shin or a foot that is turned is to take its toes along.
+        legs = {one for leg in feet.legs(skeleton) for one in (leg.thigh, leg.knee, leg.ankle)}
+        hips = above and not legs & {skeleton.index(pin.joint) for pin in above}
+        if hips and np.concatenate(off).max() < FEET_TURN and skeleton.names[foot] not in pinned:
+            found.append(Pin(skeleton.names[foot], np.arange(len(clip)), at[:, foot]))
+    return found
+
+
+def _held(clip: Clip, known: Observation, pins: list[Pin]) -> np.ndarray:
+    """(F, J) how far joints stay turned as they are, to 1 where a pin says how."""
+    held = np.zeros(known.rotation.shape)
+    for pin in pins:
+        joint, apart = clip.skeleton.index(pin.joint), np.arange(len(clip))[:, None] - pin.frames
+        share = ramp(1 - np.abs(apart).min(axis=1) / max(LEAD * clip.fps, 2.0))
+        held[:, joint] = np.maximum(held[:, joint], share)
+    return np.where(known.rotation, 0.0, held)
+
+
 def _place(
-    clip: Clip, known: Observation, pins: list[Pin], edges: list[int], down: np.ndarray, axes: Axes | None
+    clip: Clip,
+    known: Observation,
+    pins: list[Pin],
+    edges: list[int],
+    down: np.ndarray,
+    axes: Axes | None,
+    held: np.ndarray | None,
 ) -> Clip:
     """Bring joints to their places by turning all that is free, frame by frame."""
     skeleton = clip.skeleton
@@ -292,6 +346,16 @@ def _place(
         other = along.get(joint, joint)
         if other not in pinned and other in joints:
             wanted[:, joints.index(other)] += change
+    # All of a body goes along whose hips, or head, are pinned far away, as after an end that nothing follows.
+    leads = [mapping[name] for name in TRUNK if mapping[name] in pinned and mapping[name] in joints]
+    for lead in leads[:1]:
+        assert lead is not None
+        shift = (wanted - start[:, joints])[:, joints.index(lead)] * FLOOR.values
+        shift *= ramp(np.linalg.norm(shift, axis=1).max() / ALONG - 1)
+        for row, joint in enumerate(joints):
+            if not {joint, along.get(joint)} & {*pinned}:
+                wanted[:, row] += shift
+                off[:, row] += np.abs(shift).max(axis=1)
     # The body comes down with its feet; not what is pinned, nor a foot that goes along with that.
     lower = dict(zip(feet.ends(skeleton), down.T))
     for row, joint in enumerate(joints):
@@ -304,17 +368,15 @@ def _place(
         return clip
     rows = [joints.index(joint) for joint in pinned]
     heavy = [joints.index(joint) for joint in feet.ends(skeleton) if joint in joints]
-    done, hinges = clip, Hinges.of(clip)
+    done, bounds = clip, Bounds(Hinges.of(clip), axes, held)
     if len(clip) <= TOGETHER:
-        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy, hinges, axes)
+        done = _steadily(clip, known, joints, start[:, joints], wanted, rows, heavy, bounds)
     rotation, translation = done.rotation.copy(), done.translation.copy()
     for i in range(0, len(moved), BLOCK):
         at = moved[i : i + BLOCK]
         part = done.take(at)
         seen = Observation(known.rotation[at], known.translation[at])
-        rotation[at], translation[at] = _approach(
-            part, seen, joints, wanted[at], rows, heavy, hinges and hinges.at(at), axes
-        )
+        rotation[at], translation[at] = _approach(part, seen, joints, wanted[at], rows, heavy, bounds.at(at))
     return clip.with_motion(rotation, translation)
 
 
@@ -326,8 +388,7 @@ def _steadily(
     wanted: np.ndarray,
     rows: list[int],
     heavy: list[int],
-    hinges: Hinges | None,
-    axes: Axes | None,
+    bounds: Bounds,
 ) -> Clip:
     """The joints in `rows` near to where they are wanted (F, n, 3), not at `start`, all frames together.
 
@@ -341,8 +402,8 @@ def _steadily(
         weights[:, heavy] *= FEET
         weights[:, rows] = 1.0
         goal = start + step * (wanted - start)
-        steady, bent = STEADY * share / SHARES[0], hinges and hinges.to(HINGED * share)
-        led, done = refine_steadily(led, known, joints, goal, weights, done, steady, bent, axes)
+        steady, bent = STEADY * share / SHARES[0], bounds.to(HINGED * share)
+        led, done = refine_steadily(led, known, joints, goal, weights, done, steady, bent)
     off = [np.linalg.norm(wanted[:, rows] - p[:, rows]).sum() for p in (start, led.positions()[:, joints])]
     return led if off[1] < off[0] else clip  # what is out of reach may swing
 
@@ -354,8 +415,7 @@ def _approach(
     wanted: np.ndarray,
     rows: list[int],
     heavy: list[int],
-    hinges: Hinges | None,
-    axes: Axes | None,
+    bounds: Bounds,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rotations and translations with which the joints in `rows` come to where they are wanted (F, n, 3).
 
@@ -377,7 +437,7 @@ def _approach(
         weights = np.full((len(clip), len(joints)), share)
         weights[:, heavy] *= FEET
         weights[:, rows] = 1.0
-        tried = refine(clip, known, joints, goal, weights, hinges and hinges.to(HINGED * share), axes)
+        tried = refine(clip, known, joints, goal, weights, bounds.to(HINGED * share))
         there = off(tried)
         nearer = np.linalg.norm(there, axis=-1).sum(axis=1) < far.sum(axis=1) - STILL
         left = np.where(nearer[:, None, None], there, left)
@@ -399,7 +459,7 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int], fixed: Col
     change = _between(len(clip), np.asarray(pin.frames), off, edges, clip.fps)
     free = ~known.rotation[:, joint, None]
     if clip.skeleton.parents[joint] not in fixed:
-        clip = _forearm_turned(clip, known, joint, np.where(free, change, 0.0))
+        clip = _also_turned(clip, known, joint, np.where(free, change, 0.0))
     done, parent = rotations.multiply(rotations.exp(change), turned[:, joint]), clip.skeleton.parents[joint]
     if parent >= 0:
         done = rotations.relative(clip.kinematics()[0][:, parent], done)
@@ -408,21 +468,25 @@ def _turn(clip: Clip, known: Observation, pin: Pin, edges: list[int], fixed: Col
     return clip.with_motion(rotation, clip.translation)
 
 
-def _forearm_turned(clip: Clip, known: Observation, joint: int, change: np.ndarray) -> Clip:
+def _also_turned(clip: Clip, known: Observation, joint: int, change: np.ndarray) -> Clip:
     """The clip with a forearm, where it is free, turned about itself by its share of how its hand is to turn,
-    rotation vectors (F, 3): a wrist alone would twist further than any. The hand stays where it is."""
+    rotation vectors (F, 3), or a neck by its share of how the head is: a wrist, or a head, alone would turn
+    further than any. The hand stays where it is."""
     skeleton, mapping = clip.skeleton, find_mapping(clip.skeleton)
-    forearm = skeleton.parents[joint]
+    above = skeleton.parents[joint]
     arms = [(mapping[side + "Hand"], mapping[side + "ForeArm"]) for side in ("Left", "Right")]
-    if (joint, forearm) not in arms or forearm < 0:
+    if above < 0 or (joint, above) not in (*arms, (mapping["Head"], mapping["Neck"])):
         return clip
     turned, placed = clip.kinematics()
-    bone = placed[:, joint] - placed[:, forearm]
-    bone = bone / np.maximum(np.linalg.norm(bone, axis=1, keepdims=True), 1e-9)
-    about = FOREARM * (change * bone).sum(axis=1, keepdims=True) * bone
-    rotation, above = clip.rotation.copy(), turned[:, skeleton.parents[forearm]]
-    shared = rotations.relative(above, rotations.multiply(rotations.exp(about), turned[:, forearm]))
-    rotation[:, forearm] = np.where(known.rotation[:, forearm, None], rotation[:, forearm], shared)
+    if (joint, above) in arms:
+        bone = placed[:, joint] - placed[:, above]
+        bone = bone / np.maximum(np.linalg.norm(bone, axis=1, keepdims=True), 1e-9)
+        change = (change * bone).sum(axis=1, keepdims=True) * bone
+    shared = rotations.multiply(rotations.exp(ALSO * change), turned[:, above])
+    if skeleton.parents[above] >= 0:
+        shared = rotations.relative(turned[:, skeleton.parents[above]], shared)
+    rotation = clip.rotation.copy()
+    rotation[:, above] = np.where(known.rotation[:, above, None], rotation[:, above], shared)
     return clip.with_motion(rotation, clip.translation)
 
 

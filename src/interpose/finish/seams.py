@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish.solve import Axes, refine
+from interpose.finish.solve import Axes, Bounds, refine
 from interpose.geometry import measures
 from interpose.geometry.time import ease, runs
 from interpose.geometry.values import moved, offset
@@ -230,7 +230,7 @@ def soften(
         - np.where(shared[some], 0.5, 1.0)[:, None, None] * np.repeat(excess, 2, axis=0)[some]
     )
     everything = tuple(range(len(motion.skeleton)))
-    nudged = refine(poses, fresh, everything, goal, np.repeat(weights, 2, axis=0)[some], axes=axes)
+    nudged = refine(poses, fresh, everything, goal, np.repeat(weights, 2, axis=0)[some], Bounds(axes=axes))
     row = {(int(e), int(w)): i for i, (e, w) in enumerate(zip(edge[some], way[some]))}
 
     def measure(values: Values, slots: list[int], edge: int, way: int) -> Fade:

@@ -156,6 +156,11 @@ def _way(clip: Clip, foot: np.ndarray, own: list[Step]) -> np.ndarray:
     at = np.interp(share * way[-1], way, time)
     path = np.stack([np.interp(at, time, values) for values in foot.reshape(len(foot), -1).T], axis=1)
     path = path.reshape(foot.shape)
+    # Toe and heel rise and come down when they did: `at` rests in one frame of a stance, and skips others.
+    aside, turned = foot[:, 0] - foot[:, 1], path[:, 0] - path[:, 1]
+    long = np.linalg.norm(aside[:, ::2], axis=1) / np.maximum(np.linalg.norm(turned[:, ::2], axis=1), 1e-9)
+    path[:, 1, 1] = foot[:, 1, 1]
+    path[:, 0] = path[:, 1] + np.stack([long * turned[:, 0], aside[:, 1], long * turned[:, 2]], axis=1)
     toeless = feet.legs(clip.skeleton)[own[0].leg].toe is None
     path[..., 1] += height[:, None] * (LIFT[0] if toeless else LIFT) * grown
     return path

@@ -7,7 +7,7 @@ known joint: there the rotations that the clip already has (a classical completi
 from __future__ import annotations
 
 from collections.abc import Callable, Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import solveh_banded
@@ -31,6 +31,33 @@ STRAIGHT, BENT = 0.1, 0.35
 STEPS, BLOCK, DAMPING = 3, 512, 2e-3
 # See `formats.axes`.
 Axes = Callable[[Clip], dict[int, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What joints do not do as a body moves towards positions.
+
+    Attributes:
+        hinges: what pulls knees and elbows back that turn otherwise than by bending.
+        axes: of a clip the joints that turn about fewer than three axes, as `formats.axes`.
+        held: (F, J) 0 to 1, how far each joint stays turned in the world as it is, whatever is above it does.
+    """
+
+    hinges: Hinges | None = None
+    axes: Axes | None = None
+    held: np.ndarray | None = None
+
+    def at(self, frames: np.ndarray) -> Bounds:
+        """Of some frames."""
+        held = None if self.held is None else self.held[frames]
+        return replace(self, hinges=self.hinges and self.hinges.at(frames), held=held)
+
+    def to(self, weight: float) -> Bounds:
+        """With hinges of another weight."""
+        return replace(self, hinges=self.hinges and self.hinges.to(weight))
+
+
+FREELY = Bounds()
 
 
 def solve(clip: Clip, observation: Observation, joints: tuple[int, ...], positions: np.ndarray) -> Clip:
@@ -219,17 +246,15 @@ def refine(
     joints: tuple[int, ...],
     positions: np.ndarray,
     weights: np.ndarray | None = None,
-    hinges: Hinges | None = None,
-    axes: Axes | None = None,
+    bounds: Bounds = FREELY,
 ) -> Clip:
     """A few damped Gauss-Newton steps on all joint angles at once, towards positions as in `solve`.
 
     Where bones differ from those in the positions, aiming leaves the whole difference at the end of a limb;
     this shares it out. Damping keeps what positions do not tell. `weights` (F, n), or (F, n, 3) by axis, says
-    how much each position counts; default: all the same. `hinges` hold knees and elbows to how they bend.
-    `axes` says about which some joints turn alone.
+    how much each position counts; default: all the same.
     """
-    freedom = Freedom.of(clip, observation, joints, hinges, axes)
+    freedom = Freedom.of(clip, observation, joints, bounds)
     for _ in range(STEPS):
         normal, towards, frame = freedom.normal(clip, positions, weights)
         normal += DAMPING * np.eye(normal.shape[2])
@@ -245,20 +270,19 @@ def refine_steadily(
     weights: np.ndarray,
     done: np.ndarray,
     steady: float,
-    hinges: Hinges | None = None,
-    axes: Axes | None = None,
+    bounds: Bounds = FREELY,
 ) -> tuple[Clip, np.ndarray]:
     """As `refine`, of all frames together: what is done to the motion changes evenly over time.
 
     Args:
-        clip, observation, joints, positions, weights, hinges, axes: as in `refine`.
+        clip, observation, joints, positions, weights, bounds: as in `refine`.
         done: (F, d) what has been done to the motion already, as it came from here; zeros (F, 1) at first.
         steady: how much the second differences of what is done count, squared, against metres squared.
 
     Returns:
         The clip, and what has been done to it by now.
     """
-    freedom = Freedom.of(clip, observation, joints, hinges, axes)
+    freedom = Freedom.of(clip, observation, joints, bounds)
     frames, size = freedom.free.shape
     even = steady * bending(frames)
     for _ in range(STEPS):
@@ -291,8 +315,7 @@ class Freedom:
         free: (F, d) 1 where they may, three columns for each.
         above: (n, movable) 1 where the known joint hangs below the one that may turn.
         by_shift: (3 n, 3 carriers) how much a shift of each carrier along each axis moves each known joint.
-        hinges: what pulls knees and elbows back that turn otherwise than by bending.
-        axes: of a clip the joints that turn about fewer than three axes, as `formats.axes`.
+        bounds: what joints do not do.
     """
 
     known: list[int]
@@ -301,18 +324,10 @@ class Freedom:
     free: np.ndarray
     above: np.ndarray
     by_shift: np.ndarray
-    hinges: Hinges | None = None
-    axes: Axes | None = None
+    bounds: Bounds
 
     @classmethod
-    def of(
-        cls,
-        clip: Clip,
-        observation: Observation,
-        joints: tuple[int, ...],
-        hinges: Hinges | None = None,
-        axes: Axes | None = None,
-    ) -> Freedom:
+    def of(cls, clip: Clip, observation: Observation, joints: tuple[int, ...], bounds: Bounds) -> Freedom:
         """Of what is not observed."""
         skeleton, known = clip.skeleton, list(joints)
         under = (skeleton.below & ~np.eye(len(skeleton), dtype=bool)).astype(float)
@@ -322,7 +337,22 @@ class Freedom:
         free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
         carried = skeleton.below[np.ix_(known, carriers)]
         by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
-        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, hinges, axes)
+        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, bounds)
+
+    def _levers(self, clip: Clip, placed: np.ndarray) -> np.ndarray:
+        """(F, n, movable, 3) from each joint that may turn to what its turns move of each known one: its own
+        place, or that of a joint between them that stays turned as it is, and is `placed` (F, J, 3) there."""
+        held, below = self.bounds.held, clip.skeleton.below
+        moves = np.repeat(placed[:, self.known, None], len(self.movable), axis=2)
+        # The topmost of several counts, and so is done last.
+        for joint in [] if held is None else np.flatnonzero(held.any(axis=0))[::-1]:
+            assert held is not None
+            under = [row for row, one in enumerate(self.known) if one != joint and below[one, joint]]
+            over = [column for column, one in enumerate(self.movable) if below[joint, one]]
+            at = np.ix_(range(len(placed)), under, over)
+            share = held[:, joint, None, None, None]
+            moves[at] = (1 - share) * moves[at] + share * placed[:, joint, None, None]
+        return np.asarray((moves - placed[:, None, self.movable]) * self.above[..., None])
 
     def normal(
         self, clip: Clip, positions: np.ndarray, weights: np.ndarray | None
@@ -330,13 +360,13 @@ class Freedom:
         """The normal equations (F, d, d) and (F, d, 1) of a step, and the global rotations of the clip."""
         turned, placed = clip.kinematics()
         frames = len(clip)
-        lever = (placed[:, self.known, None] - placed[:, None, self.movable]) * self.above[..., None]
+        lever = self._levers(clip, placed)
         x, y, z, o = lever[..., 0], lever[..., 1], lever[..., 2], np.zeros_like(lever[..., 0])
         # A small turn d about the axes of the world moves a point by d x lever: rows of that matrix.
         by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], 2)
         by_turn = by_turn.reshape(frames, 3 * len(self.known), 3 * len(self.movable))
         by_shift = np.broadcast_to(self.by_shift, (frames, *self.by_shift.shape))
-        for joint, about in self.axes(clip).items() if self.axes else ():
+        for joint, about in self.bounds.axes(clip).items() if self.bounds.axes else ():
             if joint in self.movable:
                 parent = clip.skeleton.parents[joint]
                 world = about if parent < 0 else rotations.to_matrix(turned[:, parent]) @ about
@@ -350,7 +380,7 @@ class Freedom:
         heavy = axes.reshape(frames, 1, -1)
         transposed = np.swapaxes(jacobian, 1, 2) * heavy
         normal, towards = transposed @ jacobian, transposed @ miss
-        for joint, stiff, pull in self.hinges.pulls(clip, turned) if self.hinges else ():
+        for joint, stiff, pull in self.bounds.hinges.pulls(clip, turned) if self.bounds.hinges else ():
             if joint in self.movable:
                 at = slice(3 * self.movable.index(joint), 3 * self.movable.index(joint) + 3)
                 normal[:, at, at] += stiff
@@ -377,7 +407,17 @@ class Freedom:
         rotation[:, self.movable] = np.where(free, done, rotation[:, self.movable])
         shift = to_parent(step[:, turns:].reshape(frames, -1, 3), self.carriers)
         translation[:, slots] += shift / skeleton.scale_above[self.carriers][:, None]
-        return clip.with_motion(rotation, translation)
+        done, held = clip.with_motion(rotation, translation), self.bounds.held
+        for joint in [] if held is None else np.flatnonzero(held.any(axis=0)):
+            assert held is not None
+            now = done.kinematics()[0]
+            off = rotations.log(rotations.multiply(turned[:, joint], rotations.conjugate(now[:, joint])))
+            kept = rotations.multiply(rotations.exp(held[:, joint, None] * off), now[:, joint])
+            above = skeleton.parents[joint]
+            rotation = done.rotation.copy()
+            rotation[:, joint] = kept if above < 0 else rotations.relative(now[:, above], kept)
+            done = clip.with_motion(rotation, translation)
+        return done
 
 
 def solve_error(clip: Clip, joints: tuple[int, ...], positions: np.ndarray) -> np.ndarray:

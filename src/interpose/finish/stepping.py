@@ -38,8 +38,9 @@ LEVEL, UPRIGHT = 0.08, 0.7
 # Radians that one step turns a foot by, at most, and metres that it goes, as long as there is time; seconds
 # that it takes, at least and at most.
 TURN, STRIDE, QUICK, SLOW = np.radians(100.0), 0.7, 0.2, 0.5
-# Metres by which ankle and toe are lifted in the middle of a step.
-LIFT = np.array([0.08, 0.05])
+# Metres by which ankle and toe are lifted in the middle of a step, and seconds in which a heel that is up at
+# a key comes down after it, or rises before it: nobody waits on tiptoe.
+LIFT, HEELS = np.array([0.08, 0.05]), 0.3
 # Seconds over which hips sink, and metres that they may before they stay over the feet; and how far they get
 # then from where they are over them in the keys. Three of 30 turns squatted by 15 to 22 cm, now by 2 at most.
 SINKS, SINK, SWAY = 0.25, 0.05, 0.15
@@ -202,6 +203,10 @@ def _steps(turn: Turn, clip: Clip, span: tuple[int, int]) -> np.ndarray | None:
     for leg in range(2):
         phases = (time[:, None] - middles[leg != first :: 2]) / takes + 0.5
         path[:, leg] = turn.stance(leg, ramp(phases).mean(axis=1))
+        heights = turn.feet[:, leg, :, 1]
+        low, soon = heights.min(axis=0), HEELS * fps
+        near = np.stack([1 - ramp(time / soon), 1 - ramp((frames - time) / soon)])
+        path[:, leg, :, 1] = low + np.einsum("kt,kj->tj", near, heights - low)
         lift = np.sin(np.pi * np.clip(phases, 0, 1)).sum(axis=1) ** 2
         path[:, leg, :, 1] += lift[:, None] * (LIFT if toes[leg] else LIFT[0]) * grown
     return path
