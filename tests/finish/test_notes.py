@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -190,3 +192,38 @@ def test_what_is_said_of_a_mirror_image_is_the_same(cmu_walk, pace):
     assert both[0] == both[1]
     assert any("to the left" in note for note in both[0])
     assert any("backwards" in note for note in both[0]) == (pace < 0)
+
+
+def test_a_hand_that_waves_on_both_sides_and_rests_between_is_said(cmu_walk):
+    pose, time = cmu_walk.take(np.repeat(60, 180)), np.arange(180) / 30.0
+    rotation, arm = pose.rotation.copy(), pose.skeleton.index("LeftArm")
+    wave = rotations.about("Z", 0.6 * np.sin(2 * np.pi * 1.3 * time))
+    rotation[:, arm] = rotations.multiply(wave, rotation[:, arm])
+    waves, gap = pose.with_motion(rotation, pose.translation), Gap(60, 120)
+    assert not notes.idle(waves, gap, 0)
+    rotation[60:120] = pose.rotation[60:120]
+    (said,) = notes.idle(waves.with_motion(rotation, pose.translation), gap, 500)
+    assert said.startswith("flagged: LeftHand moves at 0.0 m/s in it, beside it at")
+    assert said.endswith("A key near frame 590 says what it does")
+    rotation[120:] = pose.rotation[120:]
+    assert not notes.idle(waves.with_motion(rotation, pose.translation), gap, 0)
+
+
+def test_of_who_walks_on_a_hand_that_rests_is_said(cmu_walk):
+    """The middle of the gap moves as much as the motion around it, but for that."""
+    rotation, arm = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("LeftArm")
+    wave = rotations.about("Z", 0.6 * np.sin(2 * np.pi * 1.3 * np.arange(len(cmu_walk)) / 30))
+    rotation[:, arm] = rotations.multiply(wave, rotation[60, arm])
+    waves = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    rotation = rotation.copy()
+    rotation[60:120, [arm, arm + 1]] = rotation[60, [arm, arm + 1]]
+
+    class Rests(type(registry.get("linear"))):  # type: ignore[misc]
+        def complete(self, clip, observation, seed=None):  # type: ignore[no-untyped-def]
+            raw = super().complete(clip, observation, seed)
+            return replace(raw, clip=raw.clip.with_motion(rotation, cmu_walk.translation))
+
+    seen = Observation.from_gaps(waves, [Gap(60, 120)])
+    (report,) = complete(waves, seen, Rests()).report.gaps
+    assert any(note.startswith("flagged: LeftHand moves at") for note in report.notes), report.notes
+    assert not any("as much as" in note for note in report.notes)

@@ -28,6 +28,9 @@ DULL = 0.33
 # validation performers' real motion none does; of fills by `linear` 15, `spline` 14, `cmib` 5, `cae` 3 do,
 # and by `small` none. Who runs is in the air for a third of the time.
 GLIDES, AIRBORNE = 0.25, 0.35
+# Metres a second, with the usual leg, at which a hand stirs against its shoulder on both sides of a gap, and
+# seconds of the gap, from which on one that moves half as much in it is said to rest.
+STIRRING, RESTING = 0.4, 1.5
 # Metres a second, with the usual leg: who is slower walks.
 RUNS = 2.0
 # Metres, with the usual leg, that joints are expected to be off by in the mean from which a report says so:
@@ -291,6 +294,32 @@ def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) ->
         f"flagged: the middle moves {100 * alive:.0f} % as much as the motion around it: a mean of many "
         f"possible motions. A key near frame {first + (gap.start + gap.stop) // 2} says which one is meant"
     ]
+
+
+def idle(finished: Clip, gap: Gap, first: int) -> list[str]:
+    """Notes of hands that stir on both sides of a long gap, as those that wave do, and rest in it."""
+    fps, near, found = finished.fps, round(finished.fps), []
+    if gap.joints is not None or len(gap) < RESTING * fps:
+        return []
+    mapping, placed = find_mapping(finished.skeleton), finished.positions()
+    for side in ("Left", "Right"):
+        arm, hand = mapping[f"{side}Arm"], mapping[f"{side}Hand"]
+        if arm is None or hand is None or min(gap.start, len(finished) - gap.stop) < near / 2:
+            continue
+        way = placed[:, hand] - placed[:, arm]
+        before, inside, after = (
+            float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean()) * fps
+            for part in (
+                way[max(gap.start - near, 0) : gap.start],
+                way[gap.start : gap.stop],
+                way[gap.stop : gap.stop + near],
+            )
+        )
+        if min(before, after) > STIRRING * feet.size(finished.skeleton) and inside < min(before, after) / 2:
+            said = f"flagged: {finished.skeleton.names[hand]} moves at {inside:.1f} m/s in it, beside it at"
+            middle = first + (gap.start + gap.stop) // 2
+            found.append(f"{said} {before:.1f} and {after:.1f}. A key near frame {middle} says what it does")
+    return found
 
 
 def doubtful(risk: np.ndarray | None, finished: Clip, gap: Gap, first: int) -> list[str]:
