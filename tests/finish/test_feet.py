@@ -9,6 +9,7 @@ import pytest
 
 from interpose.clip import Clip
 from interpose.finish import complete, feet, guarantees, notes
+from interpose.formats import load
 from interpose.geometry import measures, rotations
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -487,3 +488,14 @@ def test_what_is_said_of_slides_and_errors_does_not_depend_on_how_large_a_body_i
 
     assert told(60.0, 0.16) == 2
     assert told(10.0, 0.14) == 0
+
+
+def test_who_stands_all_the_while_does_not_sink(data):
+    """As far as a leg that is nearly straight allows."""
+    pose = load(data / "cmu_jump.bvh").take(np.zeros(90, int))
+    low = np.zeros((90, 1, 3))
+    low[30:60, 0, 1] = 0.012 * np.sin(np.pi * np.linspace(0, 1, 32)[1:-1]) ** 2
+    sunk = pose.with_motion(pose.rotation, pose.translation - low)
+    held = feet.plant(sunk, gaps_of(pose, (30, 60)), (30, 60), stands=np.ones((90, 4)))
+    off = (held.positions() - pose.positions())[:, feet.ends(pose.skeleton), 1]
+    assert np.abs(off).max() < 0.005

@@ -60,6 +60,10 @@ HEEL, STRAIGHTER, BEYOND = np.radians(40.0), 0.01, 0.10
 SWIVEL = np.radians(30.0)
 # Metres by which a foot may be under what it rests on.
 STEP_UP = 0.02
+# Metres by which a foot that stands on both sides of a gap may be higher or lower in between, and stands
+# nevertheless: toes of people of Bandai-Namco who stand all the while sank by more than 4 mm in 18 of 45 gaps
+# of one and two seconds, and in truth in none; so they do in none.
+SAGS = 0.02
 # Seconds of observed motion beside a gap in which stances are looked for.
 NEARBY = 2.0
 
@@ -356,7 +360,7 @@ def plant(
         if lift:
             speeds = measures.speed(feet + shift, clip.fps)
             lowest = floor - sink + clear * ramp(speeds / QUICK - 1)
-            raised = spread(rounded((lowest - feet[..., 1]).max(axis=1), sink), over)
+            raised = spread(rounded((lowest - (feet + shift)[..., 1]).max(axis=1), sink), over)
             shift[..., 1] += (raised * np.prod(envelope(movable, over), axis=0))[:, None]
             seen = np.asarray(known.positions(skeleton)[:, leg.foot].all(axis=1))
             shift[..., 1] += lifts(feet + shift, floor, planted, seen, movable)[:, None]
@@ -383,7 +387,7 @@ def _beside(said: np.ndarray) -> np.ndarray:
 def _hold(
     feet: np.ndarray, planted: np.ndarray, still: np.ndarray, movable: np.ndarray, fps: float, over: float
 ) -> np.ndarray:
-    """(F, 2, 3) horizontal shifts of ankle and toe that hold each of them during its contacts.
+    """(F, 2, 3) shifts of ankle and toe that hold each of them during its contacts, along the floor.
 
     feet: (F, 2, 3); planted, still: (F, 2); over: frames in which a shift comes and goes. A contact that is
     still in observed frames is tied to where it is at the seam (between the two places, when it is so at both
@@ -420,9 +424,11 @@ def _hold(
             left = min(blend, (one.start - held[k - 1].stop) // 2 + 1) if k else blend
             right = min(blend, (held[k + 1].start - one.stop) // 2 + 1) if k + 1 < len(held) else blend
             share = one.share(movable, fps, over, (left, right))
-            shifts[:, joint] += share[:, None] * one.off[np.clip(time, one.start, one.stop - 1)]
+            off = one.off[np.clip(time, one.start, one.stop - 1)]
+            # Who stands all the while neither sinks nor rises.
+            level = all(one.tied) and np.abs(one.off[one.start : one.stop, 1]).max() < SAGS
+            shifts[:, joint] += share[:, None] * off * [1.0, float(level), 1.0]
             shares[:, joint] = np.maximum(shares[:, joint], share)
-    shifts[..., 1] = 0.0
     return shifts + (1 - shares)[..., None] * shifts[:, ::-1]
 
 

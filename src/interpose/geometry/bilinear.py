@@ -49,6 +49,8 @@ def bilinear(a: Array, b: Array, sums: Table) -> Array:
         shape = np.broadcast_shapes(shape, b.shape[:-1])
         a, b = (np.broadcast_to(one, (*shape, one.shape[-1])) for one in (a, b))
     a, b = a.reshape(-1, a.shape[-1]), b.reshape(-1, b.shape[-1])
+    if len(a) <= ROWS:
+        return (((a @ left) * (b @ right)) @ out).reshape(*shape, out.shape[1])
     done = np.empty((len(a), out.shape[1]), np.result_type(a, b))
     for start in range(0, len(a), ROWS):
         part = slice(start, start + ROWS)

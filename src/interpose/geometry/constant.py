@@ -27,7 +27,7 @@ class Constant:
     def beside(self, like: Array) -> Array:
         """The array as one of the library and device of `like`; what is float, as precise."""
         if isinstance(like, np.ndarray):
-            return self.values if self._whole else self.values.astype(like.dtype)
+            return self.values if self._whole else self.values.astype(like.dtype, copy=False)
         key = (like.dtype, like.device)
         if key in self._there:
             return self._there[key]

@@ -108,4 +108,6 @@ def forward(local: Array, translation: Array, parents: tuple[int, ...]) -> tuple
 
 def _take(values: Array, joints: Constant) -> Array:
     """Some joints of (..., J, n)."""
+    if isinstance(values, np.ndarray):
+        return values.take(joints.values, axis=-2)  # asking whose array it is would take as long
     return array_namespace(values).take(values, joints.beside(values), axis=-2)

@@ -65,7 +65,7 @@ NEARER, SLIGHT = 0.5, 0.02
 # second squared), was not lost.
 ROUGHER, ROUGH = 1.5, 20.0
 ROUNDS = 8  # in which a median is approached
-BLOCK = 4096  # frames
+BLOCK = 1024  # frames
 
 
 def broken(clip: Clip) -> Observation:
@@ -359,14 +359,19 @@ def _hops(values: np.ndarray, far: float, hops: list[np.ndarray]) -> tuple[np.nd
     for gone in hops:
         count = len(gone)
         start = np.arange(2, len(values) - count - 1)
-        share = (np.arange(1, count + 1) / (count + 1))[:, None, None]
-        before, after = values[start - 1], values[start + count]
-        leave, meet = (count + 1) * steps[start - 2], (count + 1) * steps[start + count]
-        led = before + ease(share) * (after - before)
-        led = led + share * (1 - share) * ((1 - share) * leave - share * meet)
-        led = rotations.normalize(led) if values.shape[1] == 4 else led
-        frames = start + np.arange(count)[:, None]
-        apart = _apart(values[frames], led)
+        # By their first frames nearly all are ruled out.
+        for first in (True, False):
+            some = np.arange(1 if first else count)
+            share = ((some + 1) / (count + 1))[:, None, None]
+            before, after = values[start - 1], values[start + count]
+            leave, meet = (count + 1) * steps[start - 2], (count + 1) * steps[start + count]
+            led = before + ease(share) * (after - before)
+            led = led + share * (1 - share) * ((1 - share) * leave - share * meet)
+            led = rotations.normalize(led) if values.shape[1] == 4 else led
+            frames = start + some[:, None]
+            apart = _apart(values[frames], led)
+            if first:
+                start = start[apart[0] > far]
         off, near = apart[gone].min(axis=0, initial=np.inf), apart[~gone].max(axis=0, initial=0.0)
         bent = np.maximum(near, _apart(after - before, (leave + meet) / 2))
         sure = (off > far) & (bent < BENT * off)
@@ -397,14 +402,16 @@ def medians(values: np.ndarray, around: int, ends: str) -> np.ndarray:
     """
     padded = np.pad(values, [(around, around)] + [(0, 0)] * (values.ndim - 1), mode=ends)  # type: ignore[call-overload]
     middle = np.empty_like(values)
-    # In blocks: of ten minutes all windows at once would take half a gigabyte.
+    # In blocks that fit the cache, and coordinate by coordinate.
     for start in range(0, len(values), BLOCK):
-        block = middle[start : start + BLOCK]
-        piece = padded[start : start + len(block) + 2 * around]
-        windows = np.lib.stride_tricks.sliding_window_view(piece, 2 * around + 1, axis=0)
-        block[:] = windows.mean(axis=-1)
+        stop = min(start + BLOCK, len(values))
+        piece = np.ascontiguousarray(np.moveaxis(padded[start : stop + 2 * around], -1, 0))
+        near = [piece[:, first : first + stop - start] for first in range(2 * around + 1)]
+        block = np.asarray(sum(near)) / len(near)
         for _ in range(ROUNDS):
-            far = np.linalg.norm(windows - block[..., None], axis=-2, keepdims=True)
-            weight = 1.0 / np.maximum(far, SAME)
-            block[:] = (weight * windows).sum(axis=-1) / weight.sum(axis=-1)
+            far = [np.sqrt(np.add.reduce((one - block) ** 2)) for one in near]
+            weights = [1.0 / np.maximum(some, SAME) for some in far]
+            weighed = [weight * one for weight, one in zip(weights, near)]
+            block = np.asarray(sum(weighed)) / np.asarray(sum(weights))
+        middle[start:stop] = np.moveaxis(block, 0, -1)
     return middle

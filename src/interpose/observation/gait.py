@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.distance import cdist
+import scipy
 
 from interpose.clip import Clip
 from interpose.geometry.ground import FLOOR, turn
@@ -72,7 +72,7 @@ def stride(seen: np.ndarray, fps: float) -> int | None:
     if len(lags) < 3:
         return None
     apart = np.array([np.linalg.norm(seen[lag:] - seen[:-lag], axis=1).mean() for lag in lags])
-    usual = cdist(seen, seen).mean()
+    usual = scipy.spatial.distance.cdist(seen, seen).mean()
     for i in range(round(SHORTEST * fps) - 1, len(lags) - 1):
         if apart[i] < ALIKE * usual and apart[i] <= apart[i - 1] and apart[i] <= apart[i + 1]:
             return int(lags[i])
@@ -94,7 +94,7 @@ def in_step(body: Humanoid, before: Clip, after: Clip) -> InStep | None:
     if first is None or second is None:
         return None
     apart = np.linalg.norm(seen[0][-first:] - seen[1][0], axis=1)
-    if apart.min() > ALIKE * cdist(seen[0], seen[0]).mean():
+    if apart.min() > ALIKE * scipy.spatial.distance.cdist(seen[0], seen[0]).mean():
         return None
     since = first - 1 - int(apart.argmin())  # frames from that pose to the end
     rates = (faces[0][-1] - faces[0][-1 - first]) / first, (faces[1][second] - faces[1][0]) / second

@@ -29,8 +29,8 @@ OR = "or in all other frames"  # where limbs change sides once, nobody knows whi
 TOLD = 1 / 3  # of the frames in which a joint trembles: found otherwise, it is that
 
 
-def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
-    """What looks missing, in order of time.
+def scan(clip: Clip, observation: Observation | None = None, held: bool = False) -> list[Finding]:
+    """What looks missing, in order of time; if it is `held` that is meant, only what is frozen or stuck.
 
     - "missing": what `observation` says is unknown.
     - "rest pose" or "outlier": a first or last frame that has nothing to do with its neighbour, as in the
@@ -81,21 +81,21 @@ def scan(clip: Clip, observation: Observation | None = None) -> list[Finding]:
     known = observation or Observation.full(clip)
     known.check(clip)
     if several := meant(clip.skeleton):
-        return _each(several, clip, known)
+        return _each(several, clip, known, held)
     gaps = known.gaps(clip.skeleton)
     findings = [Finding("missing", gap.joints, gap.start, gap.stop, "no values") for gap in gaps]
     if len(clip) > 2:
-        findings = _looked_at(clip, known, findings)
+        findings = _looked_at(clip, known, findings, held)
     return sorted(findings, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
-def _each(several: Sequence[Joints], clip: Clip, known: Observation) -> list[Finding]:
+def _each(several: Sequence[Joints], clip: Clip, known: Observation, held: bool) -> list[Finding]:
     """What is found of each of several bodies by itself, and of all of them at once what each shows."""
     found = []
     for joints in several:
         own = list(joints)
         seen = Observation(known.rotation[:, own], known.translation[:, own])
-        found.append(scan(clip_of(clip, joints), seen))
+        found.append(scan(clip_of(clip, joints), seen, held))
     if len(several) == 1:
         return found[0]  # of the one that is meant, a whole pose is that one's
     whole = [{(one.kind, one.start, one.stop) for one in some if one.joints is None} for some in found]
@@ -111,7 +111,7 @@ def _each(several: Sequence[Joints], clip: Clip, known: Observation) -> list[Fin
     return sorted(told, key=lambda f: (f.start, f.stop, f.joints or ()))
 
 
-def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[Finding]:
+def _looked_at(clip: Clip, known: Observation, findings: list[Finding], held: bool) -> list[Finding]:
     """`findings`, and what the values themselves tell: each look leaves out what an earlier one explains."""
     steps = Steps.of(clip, known)
     findings = frozen(steps, [*findings, *steps.strays])
@@ -137,6 +137,8 @@ def _looked_at(clip: Clip, known: Observation, findings: list[Finding]) -> list[
     findings = but_whole(findings, led) + led
     again = repeated(steps)
     findings = but_repeated(findings, again, clip.fps)
+    if held:
+        return [one for one in findings if one.kind in ("frozen", *STUCK)]
     # What repeats spans all else, and says nothing of it.
     if not again:
         findings += doubled(steps)

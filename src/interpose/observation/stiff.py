@@ -170,10 +170,8 @@ def _still(
     ways = 2.0 * np.linalg.norm(turned[least:] - turned[:-least], axis=-1)
     if not (ways > USUAL * HELD).any():
         return
-    for step in np.flatnonzero(steps > LEAP).tolist():
-        beside = np.append(steps[max(0, step - NEAR) : step], steps[step + 1 : step + 1 + NEAR])
-        if steps[step] < OWN * beside.max(initial=0.0):
-            continue
+    beside = ndimage.maximum_filter(steps, footprint=[1] * NEAR + [0] + [1] * NEAR, mode="constant")
+    for step in np.flatnonzero((steps > LEAP) & (steps >= OWN * beside)).tolist():
         for part, other, backwards in (
             (turned[step::-1], lost[step + 1 :][:real], True),
             (turned[step + 1 :], lost[max(0, step + 1 - real) : step + 1], False),

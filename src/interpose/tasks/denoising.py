@@ -77,8 +77,9 @@ def denoise(
 
 def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
     """What is missing of a clip in frames start to stop - 1, as nothing moves there, and is no noise."""
+    if not (found := scan(clip, held=True)):
+        return []
     gone = ~intact(clip).rotation
-    found = [one for one in scan(clip) if one.kind in ("frozen", *STUCK)]
     # What snaps to its rest pose, and stays there, is among what is broken, which is filled.
     return [
         one
