@@ -403,6 +403,16 @@ def test_what_a_network_expects_is_kept(cmu_walk):
     assert gap.expected is not None
 
 
+def test_where_more_is_pinned_less_is_expected_to_be_off(cmu_walk):
+    frames, placed = np.arange(GAP.start, GAP.stop), cmu_walk.positions()
+    names = ("Hips", "Head", "LeftHand", "RightHand", "LeftFoot", "RightFoot")
+    expected = []
+    for count in (0, 1, 6):
+        pinned = [Pin(name, frames, placed[frames, cmu_walk.skeleton.index(name)]) for name in names[:count]]
+        expected.append(tasks.fill(cmu_walk, [GAP], "small", pins=pinned).report.gaps[0].expected)
+    assert expected[0] > expected[1] > 1.5 * expected[2]
+
+
 def test_what_would_not_be_met_is_refused(cmu_walk):
     turned = Pin("LeftHand", np.array([85]), None, rotations.about("Y", np.array([0.8])))
     with pytest.raises(RequestError, match="how it is turned"):

@@ -289,10 +289,13 @@ def _pinned(
     # A network that is told of one frame changes that frame: it is told the whole way there and back.
     ways = pins.ways(unled.clip, known, asked)
     body = _complete(clip, free, _telling(ask, ways), path) if ways else unled
+    own = body.raw
+    if own.expected is not None:
+        own = replace(own, expected=own.expected * pins.left_open(clip, known, asked))
 
     def laid(down: np.ndarray | None = None) -> Completion:
         met = pins.meet(body.clip, known, asked, down)
-        layer = Layer(ask.method.name, met, body.raw, np.zeros_like(known.rotation), pins=asked)
+        layer = Layer(ask.method.name, met, own, np.zeros_like(known.rotation), pins=asked)
         return _complete(clip, free, replace(ask, method=layer, fallback=layer), None)
 
     done, high = laid(), pins.hovering(body.clip, known, unled.clip)

@@ -23,7 +23,7 @@ from interpose.geometry.ground import FLOOR
 from interpose.geometry.time import runs
 from interpose.methods.bodies import no_humanoid
 from interpose.observation import Observation, Pin
-from interpose.skeletons import find_mapping
+from interpose.skeletons import PARENTS, find_mapping
 from interpose.skeletons.mapping import TRUNK
 
 # How much the place of every other joint counts beside a pin, round by round: first all give way together,
@@ -215,6 +215,30 @@ def ways(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> tuple[Pin, ..
     return tuple(found)
 
 
+def left_open(clip: Clip, known: Observation, pins: tuple[Pin, ...]) -> np.ndarray:
+    """(F,) 0 to 1, how far it is as open as without pins where joints are whose places are not known: of one
+    that is pinned it is not, and of those next to it half as much. Arguments as in `meet`."""
+    rows, joints = find_mapping(clip.skeleton).mapped
+    unknown = ~known.positions(clip.skeleton)[:, list(joints)]
+    left = np.ones(unknown.shape)
+    for pin in pins:
+        joint = clip.skeleton.index(pin.joint)
+        if pin.position is None or joint not in joints:
+            continue
+        row, near = rows[joints.index(joint)], _near(len(clip), pin, clip.fps)
+        for column, one in enumerate(rows):
+            told = near * (1.0 if one == row else 0.5 * (PARENTS[one] == row or PARENTS[row] == one))
+            left[:, column] = np.minimum(left[:, column], 1 - told)
+    count = unknown.sum(axis=1)
+    return np.where(count > 0, (left * unknown).sum(axis=1) / np.maximum(count, 1), 1.0)
+
+
+def _near(frames: int, pin: Pin, fps: float) -> np.ndarray:
+    """(F,) 1 at the frames of a pin, and a third of a second away nothing."""
+    apart = np.abs(np.arange(frames)[:, None] - pin.frames).min(axis=1)
+    return np.asarray(ramp(1 - apart / max(LEAD * fps, 2.0)))
+
+
 def missed(clip: Clip, pins: tuple[Pin, ...]) -> Iterator[tuple[Pin, int, float]]:
     """Each pin with a position at each of its frames, and by how many metres the joint misses it there."""
     placed = clip.positions()
@@ -312,9 +336,8 @@ def _held(clip: Clip, known: Observation, pins: list[Pin]) -> np.ndarray:
     """(F, J) how far joints stay turned as they are, to 1 where a pin says how."""
     held = np.zeros(known.rotation.shape)
     for pin in pins:
-        joint, apart = clip.skeleton.index(pin.joint), np.arange(len(clip))[:, None] - pin.frames
-        share = ramp(1 - np.abs(apart).min(axis=1) / max(LEAD * clip.fps, 2.0))
-        held[:, joint] = np.maximum(held[:, joint], share)
+        joint = clip.skeleton.index(pin.joint)
+        held[:, joint] = np.maximum(held[:, joint], _near(len(clip), pin, clip.fps))
     return np.where(known.rotation, 0.0, held)
 
 
