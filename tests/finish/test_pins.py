@@ -351,6 +351,19 @@ def test_what_is_torn_at_a_seam_and_inside_is_said_of_both(cmu_walk):
 def test_a_pin_in_the_next_street_is_asked_about(cmu_walk):
     gap = tasks.fill(cmu_walk, [GAP], "spline", pins=[lifted(cmu_walk, up=(0, 0, 30))]).report.gaps[0]
     assert "is the unit right?" in " ".join(gap.notes)
+    half = cmu_walk.slice(0, 100)
+    for away, asked in ((3.0, False), (300.0, True)):
+        pin = lifted(half, 90, (0.0, 0.0, away), "Hips")
+        (gap,) = tasks.fill(half, [Gap(70, 100)], "spline", pins=[pin]).report.gaps
+        assert any("is the unit right?" in note for note in gap.notes) is asked, "an end may be anywhere"
+
+
+def test_each_joint_that_misses_its_pin_is_said(cmu_walk):
+    pinned = [lifted(cmu_walk, up=(0.0, 2.5, 0.0), joint=name) for name in ("LeftHand", "RightHand")]
+    pinned.append(lifted(cmu_walk, up=(0.0, 0.0, 0.0), joint="Hips"))
+    (gap,) = tasks.fill(cmu_walk, [GAP], "spline", pins=pinned).report.gaps
+    missed = [note for note in gap.notes if "misses its pin" in note]
+    assert len(missed) >= 2, gap.notes
 
 
 def test_a_path_and_a_pin_are_both_reported(cmu_walk):

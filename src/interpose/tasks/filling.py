@@ -93,7 +93,7 @@ def fill(
         raise RequestError(
             "there is nothing to go by",
             "no value of the clip is observed, so any motion would do",
-            "Leave at least one frame out of the gaps.",
+            "Leave at least one frame out of the gaps: pins and paths alone tell no pose.",
         )
     points, whole = _points(path or {}), _Whole(clip, observation)
     clip = _handed(clip, observation)
