@@ -774,6 +774,18 @@ def test_who_is_elsewhere_at_the_next_key_walks_there(cmu_walk):
     assert glides.mean() < 0.5
 
 
+def test_of_a_gap_in_pieces_what_is_expected_is_said_once():
+    off = [
+        f"flagged: joints are expected to be off by {cm} cm: nothing tells. A key helps" for cm in (18, 31, 9)
+    ]
+    pieces = [
+        windows.GapReport(start, start + 60, None, "small", number=1, notes=("carried on", note))
+        for start, note in zip((0, 50, 100), off)
+    ]
+    (whole,) = windows.joined(pieces)
+    assert whole.notes == ("carried on", off[1])
+
+
 def test_of_a_gap_in_pieces_the_joint_nearest_to_its_limit_counts():
     pieces = [
         GapReport(10, 40, None, "small", seam_after=2.0, seam_limit=5.0, number=1),

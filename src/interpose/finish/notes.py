@@ -61,7 +61,8 @@ DRIFTS = 0.08
 # Degrees by which a body turns further than the poses beside a gap say, or less far the other way.
 ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
-TURNS = "flagged: it turns by"  # how a note begins of who goes round once more
+# How notes begin of who goes round once more, and of what is expected to be off.
+TURNS, DOUBTS = "flagged: it turns by", "flagged: joints are expected to be off by"
 BODY = 10  # joints: what hangs together and has fewer is a prop
 
 
@@ -327,7 +328,7 @@ def doubtful(risk: np.ndarray | None, finished: Clip, gap: Gap, first: int) -> l
     if risk is None or risk.mean() <= DOUBT * feet.size(finished.skeleton):
         return []
     off = f"{100 * risk.mean():.0f} cm"
-    said = f"flagged: joints are expected to be off by {off}: nothing tells what happens here"
+    said = f"{DOUBTS} {off}: nothing tells what happens here"
     worst = first + gap.start + int(risk.argmax())
     return [said + _helps(finished, gap, f". A key near frame {worst} helps")]
 

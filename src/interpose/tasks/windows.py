@@ -14,6 +14,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.finish import GapReport
+from interpose.finish.notes import DOUBTS
 from interpose.finish.windows import ramp
 from interpose.geometry import rotations
 from interpose.methods.protocol import Method, Raw
@@ -157,9 +158,16 @@ def joined(reports: list[GapReport]) -> list[GapReport]:
             )
         }
         travel = _over(last, one, "foot_travel", lambda a, b: a + b)
-        notes = tuple(dict.fromkeys(last.notes + one.notes))
+        notes = _once((*last.notes, *one.notes))
         done[-1] = replace(last, stop=one.stop, foot_travel=travel, notes=notes, **worst, **means)
     return done
+
+
+def _once(notes: tuple[str, ...]) -> tuple[str, ...]:
+    """Notes without those that are said twice; of doubts, the largest."""
+    doubts = [note for note in notes if note.startswith(DOUBTS)]
+    worst = max(doubts, key=lambda note: float(note.removeprefix(DOUBTS).split()[0]), default="")
+    return tuple(note for note in dict.fromkeys(notes) if note not in doubts or note == worst)
 
 
 def _over(one: GapReport, other: GapReport, name: str, combine: Callable[..., float]) -> Any:
