@@ -104,6 +104,8 @@ def test_weights_of_ones_own_are_made_judged_and_used(takes, data, capsys):
     capsys.readouterr()
     assert main(["train", "--data", str(takes), "--out", "mine", *words]) == 2
     assert "has weights already" in capsys.readouterr().err
+    assert main(["train", "--from", "mine", "--data", str(takes), "--out", "mine", *words]) == 2
+    assert "has weights already" in capsys.readouterr().err, "and once more they may be tuned"
     Path("mine/small.onnx").unlink()
     (takes / "a.bvh").rename(takes / "b.bvh")
     assert main(["train", "--data", str(takes), "--out", "mine", *words]) == 2

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from interpose.errors import FileError, RequestError  # noqa: E402
 from interpose.methods import weights  # noqa: E402
 from interpose.methods.cae import run  # noqa: E402
 from interpose.models.cae import Infiller, to_image  # noqa: E402
-from interpose.training import cae, export  # noqa: E402
+from interpose.training import base, cae, export, loop  # noqa: E402
 from interpose.training.budget import Budget  # noqa: E402
 from interpose.training.cae import (  # noqa: E402
     NETWORKS,
@@ -285,6 +286,36 @@ def test_a_damaged_checkpoint_is_one_error(pack, tmp_path):
     (tmp_path / "settings.json").write_text("{}")
     with pytest.raises(FileError, match="cannot go on"):
         train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2))
+
+
+def test_a_run_that_starts_anew_has_a_log_of_its_own(pack, tmp_path):
+    (tmp_path / "log.jsonl").write_text('{"step": 7, "hours": 1.0, "fraction": 0.9}\n')
+    train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2), say=str)
+    steps = [json.loads(line)["step"] for line in (tmp_path / "log.jsonl").read_text().splitlines()]
+    assert 7 not in steps
+
+
+def test_a_disk_that_is_full_is_one_error(pack, tmp_path, monkeypatch):
+    def full(what, path):  # type: ignore[no-untyped-def]
+        Path(path).write_bytes(b"half")
+        raise RuntimeError("[enforce fail at inline_container.cc:672] . unexpected pos")
+
+    monkeypatch.setattr(torch, "save", full)
+    with pytest.raises(FileError, match="room"):
+        train_cae([pack], tmp_path, Budget.parse("1steps"), CaeSettings(length=32, batch=2), say=str)
+    assert not list(tmp_path.glob("*.new"))
+
+
+def test_weights_of_another_kind_are_refused(pack, tmp_path):
+    cae_card = weights.find("cae")
+    with pytest.raises(RequestError, match="of another kind"):
+        base.begin(base.BaseSettings(), ("",), cae_card)
+    with pytest.raises(RequestError, match="config=base"):
+        base.begin(base.BaseSettings(config="small"), ("",), weights.find("base"))
+    (tmp_path / "checkpoint.pt").touch()
+    (tmp_path / "settings.json").write_text('{"network": "cae"}')
+    with pytest.raises(FileError, match="another recipe"):
+        loop.recorded(tmp_path, "network")
 
 
 def test_a_run_from_shipped_weights_begins_with_them_and_keeps_their_history(pack, tmp_path, monkeypatch):

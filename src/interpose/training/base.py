@@ -27,7 +27,7 @@ from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.device import mixed, pick_device, processes, send
-from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, recorded, restore, taught
+from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, of_kind, recorded, restore, taught
 from interpose.training.optimizers import Muon
 from interpose.training.poses import Batch, Poses, labels_of
 
@@ -74,6 +74,7 @@ TASKS: dict[str, dict[str, float]] = {
 
 
 # How a network is wired, which none can change that begins with another.
+OWN = ("base", "small", "small-open")  # what runs networks of this kind
 WIRING = ("residual", "velocities", "near", "apart", "distances", "room")
 
 
@@ -332,6 +333,7 @@ def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -
     asked = settings.network(labels)
     if not start:
         return Base(asked)
+    of_kind(start, *OWN)
     # What a network is wired like has no weights of its own that could tell.
     wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout}
     model = Base(BaseConfig(**wired))
@@ -339,6 +341,12 @@ def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -
     larger = settings.width or settings.config != start.training["config"]
     grows = larger and asked.width > model.config.width
     sizes = () if grows else tuple(name for name in ("width", "heads", "layers") if getattr(settings, name))
+    if not grows and settings.config != (config := start.training["config"]):
+        raise RequestError(
+            f"cannot begin with {start.name} and config={settings.config}",
+            f"it has config={config}",
+            f"Write --set config={config}, or train from nothing, without --start.",
+        )
     for name in (*WIRING, *sizes):
         if (now := getattr(asked, name)) != (then := getattr(model.config, name)):
             raise RequestError(

@@ -226,13 +226,23 @@ def recorded(folder: Path, network: str = "") -> dict[str, Any] | None:
         return None
     try:
         kept: dict[str, Any] = json.loads((folder / "settings.json").read_text())
-        return kept[network] if network else kept
-    except (OSError, ValueError, KeyError):
-        raise FileError(
-            f"cannot go on from {path}",
-            "settings.json beside it, which says of what it is, is missing or damaged",
-            "Delete it or name another folder.",
-        ) from None
+        if isinstance(found := kept[network] if network else kept, dict):
+            return found
+    except (OSError, ValueError, KeyError, TypeError):
+        pass
+    raise FileError(
+        f"cannot go on from {path}",
+        "settings.json beside it is missing or damaged, or it is of a run of another recipe",
+        "Name another folder with --out.",
+    )
+
+
+def of_kind(start: Card, *methods: str) -> None:
+    """RequestError for weights of a network of another kind than one of these methods runs."""
+    if start.method not in methods:
+        why = f"it is a network of another kind, of {start.method}"
+        fix = f"Name weights of {' or '.join(methods)}, or train from nothing, without --start."
+        raise RequestError(f"cannot begin with {start.name}", why, fix)
 
 
 def from_weights(folder: Path, start: Card | None) -> bool:
@@ -336,6 +346,8 @@ class Trainer:
         if recorded(self.folder) is None:
             if rank() == 0 and not start:
                 path.unlink(missing_ok=True)  # of a run that never came to save anything
+            if rank() == 0:
+                (self.folder / "log.jsonl").unlink(missing_ok=True)
         elif start and not (path.exists() and json.loads(path.read_text())["training"] == _history(start)):
             raise RequestError(
                 f"the run in {self.folder} cannot go on from {start.name}",
@@ -386,8 +398,14 @@ class Trainer:
             state["opponent"] = self.opponent.model.state_dict()
             state["opponent_optimizer"] = self.opponent.optimizer.state_dict()
         for name, what in (("checkpoint.pt", state), ("averaged.pt", self.averaged.state_dict())):
-            torch.save(what, self.folder / (name + ".new"))
-            os.replace(self.folder / (name + ".new"), self.folder / name)
+            new = self.folder / (name + ".new")
+            try:
+                torch.save(what, new)
+            except RuntimeError as error:  # so it says that a disk is full
+                new.unlink(missing_ok=True)
+                why = str(error).splitlines()[0]
+                raise FileError(f"cannot write {new}", why, "Check whether there is room.") from None
+            os.replace(new, self.folder / name)
 
     def _rate(self) -> float:
         fraction = self.budget.fraction

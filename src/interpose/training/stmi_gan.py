@@ -49,7 +49,7 @@ from interpose.skeletons import JOINTS, PARENTS
 from interpose.training.budget import Budget
 from interpose.training.deconvolution import quicken
 from interpose.training.device import mixed, pick_device, processes, send
-from interpose.training.loop import SHARE, SOME, Opponent, Settings, Trainer, restore, taught
+from interpose.training.loop import SHARE, SOME, Opponent, Settings, Trainer, of_kind, restore, taught
 from interpose.training.windows import Windows
 
 DATASETS = ("lafan1", "bandai")
@@ -308,6 +308,8 @@ def train_stmi_gan(
     held_out = Windows(packs, ("validation",), 120, device).spread(96)
     generator, discriminator = (make(settings.network).to(device) for make in (Generator, Discriminator))
     fit_normaliser(generator, discriminator, windows, settings)
+    if start:
+        of_kind(start, "stmi-gan")
     if start and settings.network.together > 1 and StmiGanConfig.of(start.training["network"]).together == 1:
         generator.grow(trained(start))
     elif start:
