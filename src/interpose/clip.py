@@ -67,7 +67,12 @@ class Skeleton:
         if not count:
             raise RequestError("the skeleton has no joints", "there is nothing to move", "Name one or more.")
         fill(self, "rest_translation", numbers(self.rest_translation, "rest_translation"))
-        if self.rest_translation.shape != (count, 3) or not np.isfinite(self.rest_translation).all():
+        rests = {"rest_translation": self.rest_translation, "rest_rotation": self.rest_rotation}
+        for name, value in {**rests, "rest_scale": self.rest_scale}.items():
+            if value is not None and not np.isfinite(numbers(value, name)).all():
+                why = f"{name} has values that are no numbers, or without end"
+                raise RequestError("the skeleton cannot be used", why, "Give finite numbers.")
+        if self.rest_translation.shape != (count, 3):
             raise RequestError(
                 "bones do not fit",
                 f"expected ({count}, 3) numbers, got {self.rest_translation.shape}",
@@ -79,7 +84,7 @@ class Skeleton:
             fill(self, "rest_scale", np.ones(count))
         for name, shape in (("rest_rotation", (count, 4)), ("rest_scale", (count,))):
             fill(self, name, value := numbers(getattr(self, name), name))
-            if value.shape != shape or not np.isfinite(value).all():
+            if value.shape != shape:
                 raise RequestError(
                     f"{name} does not fit",
                     f"expected {shape} numbers, got {value.shape}",

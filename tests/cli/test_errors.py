@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from pathlib import Path
 import pytest
 
 import interpose.cli
+from interpose.cli import main
 from interpose.errors import FileError
 
 
@@ -221,11 +223,13 @@ def test_an_interrupt_is_quiet_and_leaves_nothing(run, take, monkeypatch, number
     assert [path.name for path in take.parent.iterdir()] == ["take.bvh"]
 
 
-def start(*tokens: str, cwd: Path, **options: object) -> subprocess.Popen:
+def start(
+    *tokens: str, cwd: Path, how: tuple[str, ...] = ("-m", "interpose"), **options: object
+) -> subprocess.Popen:
     source = str(Path(interpose.cli.__file__).parents[2])
     path = os.pathsep.join([source, os.environ.get("PYTHONPATH", "")])
     return subprocess.Popen(
-        [sys.executable, "-m", "interpose", *tokens],
+        [sys.executable, *how, *tokens],
         cwd=cwd,
         env=os.environ | {"PYTHONPATH": path},
         stdout=subprocess.PIPE,
@@ -253,20 +257,30 @@ def test_a_broken_pipe_is_quiet(take, command):
     assert process.wait() == 0
 
 
+WAITS = """
+import runpy, sys, time
+from interpose import tasks
+
+def wait(*args, **kwargs):
+    open("waits", "w").close()
+    time.sleep(100)
+
+tasks.fill = wait
+sys.argv[0] = "interpose"
+runpy.run_module("interpose", run_name="__main__")
+"""
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of POSIX")
-def test_control_c_in_a_process(tmp_path):
-    """Interrupted while it waits for its input."""
-    pipe = tmp_path / "gaps.json"
-    os.mkfifo(pipe)
+def test_control_c_in_a_process(tmp_path, data):
+    """Interrupted while it works."""
+    shutil.copy(data / "cmu_walk.bvh", tmp_path / "take.bvh")
     # A shell that runs the tests in the background has them ignore Ctrl-C, and so all that they start.
     heard = lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)  # noqa: E731
-    process = start("fill", "take.bvh", "--gaps", "gaps.json", cwd=tmp_path, preexec_fn=heard)
-    writer = None
-    while writer is None and process.poll() is None:
-        try:
-            writer = os.open(pipe, os.O_WRONLY | os.O_NONBLOCK)
-        except OSError:  # nobody reads yet
-            time.sleep(0.02)
+    words = ("take.bvh", "--gap", "10:20")
+    process = start("fill", *words, cwd=tmp_path, how=("-c", WAITS), preexec_fn=heard)
+    while not (tmp_path / "waits").exists() and process.poll() is None:
+        time.sleep(0.02)
     # Once more if it was just where Python ignores exceptions, as in a callback of the garbage collector.
     for _ in range(3):
         process.send_signal(signal.SIGINT)
@@ -275,7 +289,36 @@ def test_control_c_in_a_process(tmp_path):
             break
         except subprocess.TimeoutExpired:
             continue
-    if writer is not None:
-        os.close(writer)
     assert process.returncode == 130
     assert (out, err) == ("", "")
+
+
+def test_what_is_no_file_is_not_waited_for(tmp_path, capsys, monkeypatch, data):
+    """A pipe of a name in the way, or devices that never end."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(data / "cmu_walk.bvh", "a.bvh")
+    os.mkfifo("o.json")
+    assert main(["fill", "a.bvh", "--gap", "10:20", "--method", "spline", "-o", "o.bvh", "--force"]) == 2
+    assert main(["skeleton", "a.bvh", "--save-map", "o.json", "--force"]) == 2
+    assert main(["fill", "a.bvh", "--gaps", "/dev/zero"]) == 3
+    assert main(["skeleton", "a.bvh", "--map", "/dev/zero"]) == 3
+    assert "no regular file" in capsys.readouterr().err
+
+
+def test_links_to_nothing_are_not_replaced(tmp_path, capsys, monkeypatch, data):
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(data / "cmu_walk.bvh", "a.bvh")
+    os.symlink("nowhere.bvh", "o.bvh")
+    assert main(["fill", "a.bvh", "--gap", "10:20", "--method", "spline", "-o", "o.bvh"]) == 2
+    assert "exists already" in capsys.readouterr().err
+    assert os.path.islink("o.bvh")
+
+
+def test_names_in_files_tell_terminals_nothing(tmp_path, capsys, data):
+    text = (data / "cmu_walk.bvh").read_text().replace("ROOT Hips", "ROOT Hi\x1b[2Jps")
+    (tmp_path / "a.bvh").write_text(text)
+    assert main(["skeleton", str(tmp_path / "a.bvh")]) == 0
+    assert main(["fill", str(tmp_path / "a.bvh"), "--gap", "10:20", "--joints", "Nose"]) == 2
+    told = capsys.readouterr()
+    assert "\x1b[2J" not in told.out + told.err
+    assert "Hi\ufffd[2Jps" in told.out

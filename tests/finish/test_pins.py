@@ -221,14 +221,35 @@ def test_places_and_turns_that_go_together_are_both_met(cmu_walk):
     assert off[1] < 0.9 * off[0]
 
 
+@pytest.mark.parametrize("placed", [False, True])
 @pytest.mark.parametrize("about", ["X", "Y"])
-def test_feet_stay_where_hips_are_turned(cmu_walk, about):
+def test_feet_stay_where_hips_are_turned(cmu_walk, about, placed):
     free = tasks.fill(cmu_walk, [GAP], "spline").clip
     there = rotations.multiply(rotations.about(about, np.radians(25.0)), free.kinematics()[0][85, 0])
-    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[Pin("Hips", [85], None, [there])]).clip
+    pin = Pin("Hips", [85], free.positions()[[85], 0] if placed else None, [there])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip
     assert rotations.angle(done.kinematics()[0][85, 0], there) < np.radians(0.1)
     ends = feet.ends(done.skeleton)
     assert np.linalg.norm(done.positions()[85, ends] - free.positions()[85, ends], axis=-1).max() < 0.03
+
+
+@pytest.mark.parametrize("off", [(0.0, 0.15, 0.0), (0.5, 0.0, 0.0), (1.0, 0.0, 0.0)])
+def test_hips_that_are_placed_and_turned_come_there_and_feet_give_way(cmu_walk, off):
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    there = rotations.multiply(rotations.about("Y", np.radians(10.0)), free.kinematics()[0][85, 0])
+    pin = Pin("Hips", np.array([85]), free.positions()[[85], 0] + off, there[None])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[pin]).clip
+    assert np.linalg.norm(done.positions()[85, 0] - pin.position[0]) < 2e-3
+    assert rotations.angle(done.kinematics()[0][85, 0], there) < np.radians(0.1)
+
+
+def test_a_foot_is_where_it_is_pinned_as_hips_are_turned(cmu_walk):
+    free = tasks.fill(cmu_walk, [GAP], "spline").clip
+    there = rotations.multiply(rotations.about("Y", np.radians(15.0)), free.kinematics()[0][85, 0])
+    foot = lifted(free, up=(0.1, 0.1, 0.0), joint="LeftFoot")
+    turned = Pin("Hips", np.array([85]), None, there[None])
+    done = tasks.fill(cmu_walk, [GAP], "spline", pins=[foot, turned]).clip
+    assert max(far for *_, far in pins.missed(done, (foot,))) < 3e-3
 
 
 def test_a_neck_takes_its_share_of_how_a_head_turns(cmu_walk):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,11 +12,13 @@ from tests.skeletons.rigs import six_channels
 import interpose
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
+from interpose.finish import on_rig_of
 from interpose.formats import load
 from interpose.geometry.ground import turn
 from interpose.observation import timeline
 from interpose.observation.timeline import Placement, lay
 from interpose.resampling import resample
+from interpose.skeletons import find_mapping
 from interpose.skeletons.fitting import fit
 from interpose.skeletons.humanoid import reflect
 
@@ -62,14 +65,18 @@ def test_every_frame_is_kept(cmu_walk, run, jump):
         assert np.allclose(_piece(line, number).root[:, 1], scale * clip.root[:, 1], atol=1e-6)
 
 
-def test_a_smaller_body_on_another_rig_is_said_to_be_scaled(cmu_walk):
-    other = replace(cmu_walk.skeleton, rest_translation=0.7 * cmu_walk.skeleton.rest_translation)
-    rig = replace(other, names=tuple(f"mixamorig:{name}" for name in other.names))
-    for skeleton in (other, rig):
-        small = cmu_walk.with_motion(cmu_walk.rotation, 0.7 * cmu_walk.translation)
-        small = replace(small, skeleton=skeleton, source=None)
-        done = interpose.stitch([cmu_walk, small], 10, method="linear")
-        assert done.clips[1].scale == pytest.approx(1 / 0.7)
+def test_a_body_of_another_size_is_said_to_be_scaled_also_on_another_rig(cmu_walk):
+    examples = Path(interpose.__file__).parent / "examples"
+    other = load(examples / "fingers.bvh").slice(0, 60)
+    smaller = replace(cmu_walk.skeleton, rest_translation=0.7 * cmu_walk.skeleton.rest_translation)
+    small = replace(cmu_walk, skeleton=smaller, translation=0.7 * cmu_walk.translation, source=None)
+    for clip, scale in ((small, 1 / 0.7), (other, None)):
+        if scale is None:
+            assert on_rig_of(clip, cmu_walk) is not clip
+            scale = find_mapping(clip.skeleton).scale / find_mapping(cmu_walk.skeleton).scale
+            assert abs(scale - 1) > 0.01
+        done = interpose.stitch([cmu_walk, clip], 10, method="linear")
+        assert done.clips[1].scale == pytest.approx(scale)
 
 
 def test_the_same_rig_under_another_namespace_is_the_same_rig(cmu_walk):

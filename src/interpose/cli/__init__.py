@@ -146,7 +146,7 @@ def foreseen(error: Exception) -> InterposeError:
     kind = type(error).__name__
     if isinstance(error, MemoryError):
         fix = "Take a part of the clip, or close other programs."
-        return FileError("there is not enough memory", str(error), fix)
+        return FileError("there is not enough memory", str(error) or "the work takes more than there is", fix)
     if isinstance(error, OSError) and error.strerror:
         what = f"cannot use {error.filename}" if error.filename else "cannot read or write"
         fix = "Check the path, what you may do there, and whether there is room."

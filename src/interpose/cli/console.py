@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 LONG = 3000
 # Networks take as long for a frame as other work for so many.
 NETWORK, RATE = 20, 30.0
+# What a file's own names may hold, and would tell a terminal what to do.
+CONTROLS = {code: "\ufffd" for code in (*range(32), *range(127, 160)) if chr(code) not in "\n\t"}
 # Lines of a pipe or a file are as long as they need to be.
 WIDE = 250
 
@@ -44,7 +46,7 @@ def console(stderr: bool = False) -> Console:
 
 def say(text: str = "", style: str | None = None) -> None:
     """One line of output, or several."""
-    console().print(text, style=style)
+    console().print(text.translate(CONTROLS), style=style)
 
 
 def say_json(content: Any) -> None:
@@ -69,7 +71,7 @@ def say_table(columns: Sequence[str], rows: Iterable[Sequence[str]], right: Iter
         is_number = columns[i] in flush
         table.add_column(columns[i], justify="right" if is_number else "left", no_wrap=is_number)
     for row in rows:
-        table.add_row(*(row[i] for i in used))
+        table.add_row(*(row[i].translate(CONTROLS) for i in used))
     out = console()
     out.soft_wrap = False  # cells wrap inside their column
     out.print(table)
@@ -118,7 +120,8 @@ def progress(what: str, frames: int) -> Iterator[Callable[[float], None] | None]
 
 def complain(error: InterposeError) -> None:
     """An error on stderr: what, why and what to do, one line each."""
-    first, *rest = (" ".join(line.split()) for line in (error.what, error.why, error.fix) if line)
+    lines = (line.translate(CONTROLS) for line in (error.what, error.why, error.fix) if line)
+    first, *rest = (" ".join(line.split()) for line in lines)
     errors = console(stderr=True)
     errors.print(f"error: {first}", style="bold red")
     for line in rest:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -121,7 +122,7 @@ class Outputs:
                 why = "it is the file of gaps, which stays as it is" if read else "it is no earlier report"
                 fix = "Choose another name with -o: --force replaces clips and reports, not other files."
                 raise RequestError(what, why, fix)
-            if path.exists() and not force:
+            if os.path.lexists(path) and not force:
                 raise RequestError(
                     what, "the file exists already", "Choose another name with -o, or add --force."
                 )

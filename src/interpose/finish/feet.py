@@ -354,7 +354,7 @@ def plant(
             said = stands[:, 2 * leg.side : 2 * leg.side + 2]
             planted = _lasting(planted & ~(said < LIKELY), clip.fps)
             still |= _lone(known.positions(skeleton)[:, leg.foot]) & (_beside(said) > SURE)
-        shift = _hold(feet, planted, still, movable, clip.fps, over)
+        shift = _hold(feet, planted, still, movable, clip.fps, over) * [1.0, float(lift), 1.0]
         shift[:, 0] += _heel_up(leg, placed / grown, shift)
         shift *= _let_go(leg, placed / grown, shift, over)[:, None, None]
         if lift:
@@ -387,7 +387,8 @@ def _beside(said: np.ndarray) -> np.ndarray:
 def _hold(
     feet: np.ndarray, planted: np.ndarray, still: np.ndarray, movable: np.ndarray, fps: float, over: float
 ) -> np.ndarray:
-    """(F, 2, 3) shifts of ankle and toe that hold each of them during its contacts, along the floor.
+    """(F, 2, 3) shifts of ankle and toe that hold each of them during its contacts: along the floor, and as
+    high as it is beside the gap where it stands all the while.
 
     feet: (F, 2, 3); planted, still: (F, 2); over: frames in which a shift comes and goes. A contact that is
     still in observed frames is tied to where it is at the seam (between the two places, when it is so at both

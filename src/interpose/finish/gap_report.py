@@ -75,7 +75,7 @@ def gap_report(
             *notes.sized(skeleton),
             *(notes.others(skeleton, gap) if networks and own else ()),
             *notes.sunk(finished, known, gap, first),
-            *(notes.dull(alive, gap, first, ahead, span.method) or notes.idle(finished, gap, first)),
+            *(notes.dull(alive, gap, first, ahead, span.method) or notes.idle(finished, known, gap, first)),
             *notes.adrift(glide, finished, gap),
             *notes.skids(held[0] if held else None, finished, known, gap, first),
             *notes.hasty(finished, known, gap, first),

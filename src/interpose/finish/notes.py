@@ -297,24 +297,25 @@ def dull(alive: float | None, gap: Gap, first: int, ahead: bool, method: str) ->
     ]
 
 
-def idle(finished: Clip, gap: Gap, first: int) -> list[str]:
-    """Notes of hands that stir on both sides of a long gap, as those that wave do, and rest in it."""
+def idle(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
+    """Notes of hands that stir on both sides of a long gap, where they are known, and rest in it."""
     fps, near, found = finished.fps, round(finished.fps), []
     if gap.joints is not None or len(gap) < RESTING * fps:
         return []
     mapping, placed = find_mapping(finished.skeleton), finished.positions()
+    sides = slice(max(gap.start - near, 0), gap.start), slice(gap.stop, gap.stop + near)
+    seen = known.positions(finished.skeleton)
     for side in ("Left", "Right"):
         arm, hand = mapping[f"{side}Arm"], mapping[f"{side}Hand"]
-        if arm is None or hand is None or min(gap.start, len(finished) - gap.stop) < near / 2:
+        if arm is None or hand is None:
+            continue
+        told = [seen[part][:, [arm, hand]] for part in sides]
+        if not all(len(part) >= max(near / 2, 2) and part.all() for part in told):
             continue
         way = placed[:, hand] - placed[:, arm]
         before, inside, after = (
             float(np.linalg.norm(np.diff(part, axis=0), axis=1).mean()) * fps
-            for part in (
-                way[max(gap.start - near, 0) : gap.start],
-                way[gap.start : gap.stop],
-                way[gap.stop : gap.stop + near],
-            )
+            for part in (way[sides[0]], way[gap.start : gap.stop], way[sides[1]])
         )
         if min(before, after) > STIRRING * feet.size(finished.skeleton) and inside < min(before, after) / 2:
             said = f"flagged: {finished.skeleton.names[hand]} moves at {inside:.1f} m/s in it, beside it at"

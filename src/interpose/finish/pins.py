@@ -302,33 +302,40 @@ def _meet(
     turned = [pin for pin in pins if pin.orientation is not None]
     turned.sort(key=lambda pin: clip.skeleton.index(pin.joint))
     fixed = {clip.skeleton.index(pin.joint) for pin in turned}
+    if placed:
+        clip, down = _place(clip, known, placed, edges, down, axes), np.zeros_like(down)
     stays = _staying(clip, turned, placed)
-    # Turning a joint moves what hangs on it, so where both are asked for both are done twice, and what is
-    # turned by then stays so.
-    rounds: list[tuple[list[Pin], np.ndarray | None]] = [(placed, None)]
-    if turned and (placed or stays):
-        rounds.append((placed + stays, _held(clip, known, turned)))
-    for there, held in rounds:
-        if there:
-            clip = _place(clip, known, there, edges, down, axes, held)
-            down = np.zeros_like(down)
+
+    def all_turned(some: Clip) -> Clip:
         for pin in turned:
-            clip = _turn(clip, known, pin, edges, fixed)
+            some = _turn(some, known, pin, edges, fixed)
+        return some
+
+    clip = all_turned(clip)
+    if not (turned and (placed or stays)):
+        return clip
+    # Turning a joint moves what hangs on it: that comes to its place once more, and what is turned stays so.
+    # Feet give way where a pin asks for it: that one comes last.
+    held = _held(clip, known, turned)
+    for there in filter(None, (placed + stays, placed if stays else [])):
+        clip, down = all_turned(_place(clip, known, there, edges, down, axes, held)), np.zeros_like(down)
     return clip
 
 
 def _staying(clip: Clip, turned: list[Pin], placed: list[Pin]) -> list[Pin]:
     """Pins of feet where they are, if hips that they hang on are to be turned by less than FEET_TURN."""
     skeleton, (now, at) = clip.skeleton, clip.kinematics()
-    pinned, found = {pin.joint for pin in placed}, []
-    for foot in dict.fromkeys(feet.pairs(skeleton).ravel().tolist()):
-        above = [pin for pin in turned if skeleton.index(pin.joint) in skeleton.ancestors(foot)]
+    pinned, found = {skeleton.index(pin.joint) for pin in placed}, []
+    for leg in feet.legs(skeleton):
+        above = [pin for pin in turned if skeleton.index(pin.joint) in skeleton.ancestors(leg.ankle)]
         off = [rotations.angle(now[pin.frames, skeleton.index(pin.joint)], pin.orientation) for pin in above]
-        # A shin or a foot that is turned is to take its toes along.
-        legs = {one for leg in feet.legs(skeleton) for one in (leg.thigh, leg.knee, leg.ankle)}
-        hips = above and not legs & {skeleton.index(pin.joint) for pin in above}
-        if hips and np.concatenate(off).max() < FEET_TURN and skeleton.names[foot] not in pinned:
-            found.append(Pin(skeleton.names[foot], np.arange(len(clip)), at[:, foot]))
+        # A shin or a foot that is turned is to take its toes along, and a foot goes where its ankle does.
+        joints = {leg.thigh, leg.knee, *leg.foot}
+        if not above or joints & {skeleton.index(pin.joint) for pin in turned} or pinned & {*leg.foot}:
+            continue
+        if np.concatenate(off).max() < FEET_TURN:
+            frames = np.arange(len(clip))
+            found += [Pin(skeleton.names[foot], frames, at[:, foot]) for foot in dict.fromkeys(leg.foot)]
     return found
 
 
@@ -348,7 +355,7 @@ def _place(
     edges: list[int],
     down: np.ndarray,
     axes: Axes | None,
-    held: np.ndarray | None,
+    held: np.ndarray | None = None,
 ) -> Clip:
     """Bring joints to their places by turning all that is free, frame by frame."""
     skeleton = clip.skeleton
@@ -374,7 +381,7 @@ def _place(
     for lead in leads[:1]:
         assert lead is not None
         shift = (wanted - start[:, joints])[:, joints.index(lead)] * FLOOR.values
-        shift *= ramp(np.linalg.norm(shift, axis=1).max() / ALONG - 1)
+        shift *= ramp(np.linalg.norm(shift, axis=1).max() / (ALONG * feet.size(skeleton)) - 1)
         for row, joint in enumerate(joints):
             if not {joint, along.get(joint)} & {*pinned}:
                 wanted[:, row] += shift

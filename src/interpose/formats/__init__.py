@@ -197,10 +197,17 @@ def _check_readable(path: Path) -> None:
 
 def _check_free(path: Path, force: bool) -> None:
     what = f"cannot write {path}"
-    if path.is_dir():
+    try:
+        # A link to nothing is there, too.
+        folder, there, inside = path.is_dir(), os.path.lexists(path), path.parent.is_dir()
+        if "\0" in str(path):
+            raise ValueError("its name has a zero byte in it")
+    except (OSError, ValueError) as error:
+        raise FileError(what, getattr(error, "strerror", None) or str(error), "Check the name.") from None
+    if folder:
         raise RequestError(what, "it is a directory", "Name a file in it.")
-    if not path.parent.is_dir():
+    if not inside:
         raise RequestError(what, f"there is no folder {path.parent}", "Make the folder first.")
-    if path.exists() and not force:
+    if there and not force:
         fix = "Choose another name, or replace it: --force, in Python force=True."
         raise RequestError(what, "the file exists already", fix)

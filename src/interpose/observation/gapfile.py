@@ -9,6 +9,7 @@ from typing import Any
 from interpose.clip import Clip
 from interpose.errors import FileError, RequestError
 from interpose.observation.observation import Gap
+from interpose.smallfile import text_of
 
 EXAMPLE = '[{"frames": "120:160"}, {"frames": "4s:5.3s"}, {"frames": [200, 230], "joints": ["LeftArm"]}]'
 KEYS = {"frames", "start", "stop", "joints"}
@@ -27,7 +28,7 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = json.loads(text_of(path, "utf-8-sig"))
     except OSError as error:
         why = error.strerror or str(error)
         raise FileError(f"cannot read the gaps from {path}", why, "Check the path.") from None
@@ -41,7 +42,8 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
     except ValueError as error:  # numbers of thousands of digits
         raise FileError(f"the gaps in {path} are no JSON", str(error), f"Write {EXAMPLE}") from None
     except RecursionError:
-        raise FileError(f"the gaps in {path} are nested too deep", "", f"Write {EXAMPLE}") from None
+        why = "there are lists in lists, hundreds deep"
+        raise FileError(f"cannot read the gaps from {path}", why, f"Write {EXAMPLE}") from None
     entries = content.get("gaps") if isinstance(content, dict) else content
     if not isinstance(entries, list):
         why = 'expected a list of gaps, or an object with a list under "gaps"'
@@ -56,7 +58,7 @@ def read_gaps(path: str | Path, clip: Clip) -> list[Gap]:
 def read_json(path: Path) -> Any:
     """What a JSON file holds, or None when there is nothing to be made of it."""
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(text_of(path))
     except (OSError, ValueError, RecursionError):
         return None
 

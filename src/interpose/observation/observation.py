@@ -224,7 +224,7 @@ class Observation:
         fill = object.__setattr__
         fill(self, "rotation", _flags(self.rotation))
         fill(self, "translation", _flags(self.translation))
-        pins = self.pins or ()
+        pins = () if self.pins is None else self.pins
         if not isinstance(pins, Iterable | Pin):
             raise unfit("pins", pins, "Pins")
         fill(self, "pins", (pins,) if isinstance(pins, Pin) else tuple(pins))

@@ -40,7 +40,7 @@ class Part:
         fill = object.__setattr__
         for side in ("start", "stop", "at"):
             fill(self, side, frame_number(getattr(self, side)))
-        fill(self, "joints", joint_names(self.joints))
+        fill(self, "joints", tuple(dict.fromkeys(joint_names(self.joints))))
         if not self.joints:
             why = "it names no joints"
             raise RequestError("nothing is laid into the clip", why, 'Name some: ("LeftArm", "LeftHand").')

@@ -15,6 +15,7 @@ from pathlib import Path
 from interpose.errors import FileError, unknown
 from interpose.skeletons.canonical import JOINTS
 from interpose.skeletons.mapping import HANDS, Mapping
+from interpose.smallfile import text_of
 
 EXAMPLE = '{"joints": {"Hips": "pelvis", "LeftToe": ""}}'
 
@@ -26,7 +27,7 @@ def read_map(path: str | Path) -> dict[str, str]:
     """
     path = Path(path)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = json.loads(text_of(path))
     except OSError as error:
         raise FileError(
             f"cannot read the map {path}", error.strerror or str(error), "Check the path."
@@ -65,6 +66,6 @@ def map_text(mapping: Mapping) -> str:
 def is_map(path: Path) -> bool:
     """Whether a file is such a mapping."""
     try:
-        return isinstance(json.loads(path.read_text(encoding="utf-8"))["joints"], dict)
+        return isinstance(json.loads(text_of(path))["joints"], dict)
     except (OSError, ValueError, RecursionError, KeyError, TypeError):
         return False

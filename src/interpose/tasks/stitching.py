@@ -23,6 +23,8 @@ from interpose.tasks.windows import raw_part
 # even the briefest one takes, where all others would be flagged; seconds of motion on either side with which
 # that is tried; metres that feet have to travel in it; the slide (cm/s) that counts as much as gliding does.
 TRIED, BRIEFEST, BESIDE, TRAVELS, GLIDING = 1.0, 0.3, 0.7, 0.2, 50.0
+# The share of what is unhurried that one takes at least: who runs does not stop dead.
+HASTIEST = 0.6
 # Seconds that are generated of a motion that goes round already, and more of them where something would be
 # flagged: a foot that is elsewhere can step.
 BRIDGES = (0.15, 0.3, 0.5)
@@ -200,7 +202,7 @@ def _tried(
         judged: dict[int, tuple[int, float]] = {}
         longer, shorter = (
             range(own, own + round(TRIED * fps) + 1, by),
-            range(own - by, round(BRIEFEST * fps), -by),
+            range(own - by, round(max(BRIEFEST * fps, HASTIEST * own)), -by),
         )
         for length in (*longer, *shorter):
             clean = [flags == 0 for flags, _ in judged.values()]

@@ -84,7 +84,7 @@ def eased(said: np.ndarray, own: slice, motion: Seen, inside: slice) -> np.ndarr
 
 def steady(root: np.ndarray, begin: int, end: int) -> None:
     """Smooth the way of hips (F, 3) over the floor in frames begin to end - 1, where each window came with a
-    pace of its own; the frames beside stay, and so does how they are left and met."""
+    pace of its own; the frames beside stay, and so does how they are left and met where two are known."""
     first, last = max(begin - 2, 0), min(end + 2, len(root))
     bands = STIFF * bending(last - first)
     weight = np.ones(last - first)
