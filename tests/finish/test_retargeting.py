@@ -11,7 +11,7 @@ import pytest
 import interpose
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
-from interpose.finish import on_rig_of, retarget
+from interpose.finish import on_rig_of, penetration, retarget, retargeting
 from interpose.geometry import rotations
 from interpose.observation.timeline import Placement
 from interpose.skeletons import JOINTS, find_humanoid, find_mapping
@@ -221,3 +221,24 @@ def test_who_bows_bows_as_far_on_a_rig_that_bends_elsewhere(cmu_walk, hands, joi
         leans.append(rotations.normalize(trunk))
     apart = np.degrees(np.arccos(np.clip((leans[0] * leans[1]).sum(axis=1), -1, 1)))
     assert apart.max() < 3.0, apart.max()
+
+
+def test_forearms_stay_out_of_a_body_whose_shoulders_are_narrower(cmu_walk, hands):
+    """As far as they did in the motion that is brought; and hands are not jerked for it."""
+    rest = hands.skeleton.rest_translation.copy()
+    for side in ("Left", "Right"):
+        rest[find_mapping(hands.skeleton)[f"{side}Arm"]] *= 0.2
+    narrow = replace(hands, skeleton=replace(hands.skeleton, rest_translation=rest), source=None)
+    found = []
+    for clear in (False, True):
+        with pytest.MonkeyPatch.context() as patch:
+            if not clear:
+                patch.setattr(retargeting, "cleared", lambda clip, *_: clip)
+            there = retarget(cmu_walk, narrow)
+        pairs, deep = penetration.depths(there.skeleton, there.positions())
+        arms = [row for row, pair in enumerate(pairs) if "forearm" in pair[0] and "forearm" not in pair[1]]
+        hand = there.positions()[:, find_mapping(there.skeleton)["LeftHand"]]
+        found.append((deep[:, arms].max(), np.abs(np.diff(hand, 2, axis=0)).max()))
+    assert found[0][0] > 0.02
+    assert found[1][0] < 0.008
+    assert found[1][1] < 1.3 * found[0][1]

@@ -44,6 +44,7 @@ PAIRS = (
     ("left thigh", "right shin"),
     ("left shin", "right thigh"),
 )
+Pair = tuple[str, str]
 LIMIT = 0.05  # metres: deeper is worth a word
 BESIDE = 2.0  # seconds on both sides that are looked at as well
 AS_DEEP = 1e-3  # metres further are as deep
@@ -51,6 +52,14 @@ AS_DEEP = 1e-3  # metres further are as deep
 
 def segment_distance(p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray) -> np.ndarray:
     """The distance (...) between the segments from p to q and from r to s, all (..., 3)."""
+    one, other = points_between(p, q, r, s)
+    return np.asarray(np.linalg.norm(one - other, axis=-1))
+
+
+def points_between(
+    p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """The points (..., 3) of the segments from p to q and from r to s that are nearest to each other."""
     tiny = 1e-12
     u, v, w = q - p, s - r, p - r
     a, b, c = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1)
@@ -59,22 +68,28 @@ def segment_distance(p: np.ndarray, q: np.ndarray, r: np.ndarray, s: np.ndarray)
     along = np.where(cross > tiny, np.clip((b * e - c * d) / np.maximum(cross, tiny), 0, 1), 0.0)
     other = np.clip((b * along + e) / np.maximum(c, tiny), 0, 1)
     along = np.clip((b * other - d) / np.maximum(a, tiny), 0, 1)
-    return np.linalg.norm(w + along[..., None] * u - other[..., None] * v, axis=-1)
+    return p + along[..., None] * u, r + other[..., None] * v
 
 
-def depths(skeleton: Skeleton, positions: np.ndarray) -> tuple[list[tuple[str, str]], np.ndarray]:
-    """The pairs of parts that the skeleton has, and how deep each goes into the other (F, pairs), in metres;
-    0 where they do not touch.
-
-    positions: (F, J, 3) metres.
-    """
-    mapping, grown = find_mapping(skeleton), size(skeleton)
-    ends = {}
+def parts(skeleton: Skeleton, positions: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray, float]]:
+    """Of each of PARTS that the skeleton has, both ends of its axis (F, 3) and its radius in metres;
+    arguments as in `depths`."""
+    mapping, grown, ends = find_mapping(skeleton), size(skeleton), {}
     for name, (start, end, long, radius) in PARTS.items():
         a, b = mapping[start], mapping[end]
         if a is not None and b is not None:
             way = positions[:, b] - positions[:, a]
             ends[name] = (positions[:, a], positions[:, a] + long * way, grown * radius)
+    return ends
+
+
+def depths(skeleton: Skeleton, positions: np.ndarray) -> tuple[list[Pair], np.ndarray]:
+    """The pairs of parts that the skeleton has, and how deep each goes into the other (F, pairs), in metres;
+    0 where they do not touch.
+
+    positions: (F, J, 3) metres.
+    """
+    ends = parts(skeleton, positions)
     pairs = [(a, b) for a, b in PAIRS if a in ends and b in ends]
     found = np.zeros((len(positions), len(pairs)))
     for column, (one, other) in enumerate(pairs):

@@ -13,6 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
+from interpose.finish.clearing import cleared
 from interpose.finish.feet import Leg, ends, legs, reach
 from interpose.finish.floor import higher
 from interpose.finish.windows import ramp, rounded, spread
@@ -123,7 +124,7 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     for leg in legs(made.skeleton):
         rotation = reach(made.skeleton, leg, made.rotation, *made.kinematics(), _foot(made, leg, goals, toes))
         made = made.with_motion(rotation, made.translation)
-    made = _laid(made, mine, points)
+    made = cleared(_laid(made, mine, points), clip, mine, theirs)
     # A root above the hips goes and turns along, and targets stay on feet and hands, if they do so in the
     # other clip.
     like = replace(like, fps=clip.fps)
