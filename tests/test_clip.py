@@ -128,8 +128,8 @@ def test_a_skeleton_from_arrays_is_one_and_bones_are_checked():
         2,
         3,
     )
-    for bones in (np.zeros((3, 3)), np.full((2, 3), np.nan)):
-        with pytest.raises(RequestError, match="bones do not fit"):
+    for bones, said in ((np.zeros((3, 3)), "bones do not fit"), (np.full((2, 3), np.nan), "no numbers")):
+        with pytest.raises(RequestError, match=said):
             Skeleton(("a", "b"), (-1, 0), bones)
 
 
