@@ -45,6 +45,7 @@ PAIRS = (
     ("left shin", "right thigh"),
 )
 Pair = tuple[str, str]
+Part = tuple[np.ndarray, np.ndarray, float]  # both ends of its axis (F, 3), and its radius, in metres
 LIMIT = 0.05  # metres: deeper is worth a word
 BESIDE = 2.0  # seconds on both sides that are looked at as well
 AS_DEEP = 1e-3  # metres further are as deep
@@ -71,9 +72,8 @@ def points_between(
     return p + along[..., None] * u, r + other[..., None] * v
 
 
-def parts(skeleton: Skeleton, positions: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray, float]]:
-    """Of each of PARTS that the skeleton has, both ends of its axis (F, 3) and its radius in metres;
-    arguments as in `depths`."""
+def parts(skeleton: Skeleton, positions: np.ndarray) -> dict[str, Part]:
+    """Those of PARTS that the skeleton has, by name; arguments as in `depths`."""
     mapping, grown, ends = find_mapping(skeleton), size(skeleton), {}
     for name, (start, end, long, radius) in PARTS.items():
         a, b = mapping[start], mapping[end]
