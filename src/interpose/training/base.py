@@ -88,9 +88,10 @@ class BaseSettings(Settings):
         "longest": SOME,
         "short": (-10, 10),  # beyond that all gaps are the shortest, or the longest
         "context": (1, (BaseConfig().longest - 1) // 2),  # the network sees it on both sides of a gap
+        "usual": SHARE,
         "labelled": SHARE,
         "dropout": (0, 0.9),
-        **dict.fromkeys(("muon", "mirror", *WIRING), SWITCH),
+        **dict.fromkeys(("muon", "mirror", "together", *WIRING), SWITCH),
     }
 
     config: str = "small"  # one of CONFIGS
@@ -105,6 +106,7 @@ class BaseSettings(Settings):
     longest: int = 120
     short: float = 1.0  # gaps are drawn as often as their length to minus this: 0 for uniformly
     context: int = 10  # frames before a gap, and after it, at most
+    usual: float = 0.5  # share of gaps with as many frames before them, and, drawn apart, one after
     labelled: float = 0.5  # share of the motions that are told their label
     noise: float = 0.06  # metres, and radians, of the worst noise
     mirror: int = 1  # whether half of the motions are mirrored
@@ -128,6 +130,8 @@ class BaseSettings(Settings):
     risk: float = 0.02
     # How far a batch counts by what it leaves of the starting point's error: 0 by metres alone, 1 by that.
     relative: float = 0.0
+    # Whether a pose is off by the root of its joints' mean square, as L2P has it; else by their mean.
+    together: int = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -184,8 +188,10 @@ def draw_task(rng: np.random.Generator, settings: BaseSettings, batch: int) -> T
     lengths = np.arange(settings.shortest, settings.longest + 1)
     chance = lengths.astype(float) ** -settings.short
     gap = int(rng.choice(lengths, p=chance / chance.sum()))
-    before = int(rng.integers(1, settings.context + 1)) if rng.random() < 0.5 else settings.context
-    after = 1 if rng.random() < 0.5 else int(rng.integers(1, settings.context + 1))
+    before = (
+        int(rng.integers(1, settings.context + 1)) if rng.random() < 1 - settings.usual else settings.context
+    )
+    after = 1 if rng.random() < settings.usual else int(rng.integers(1, settings.context + 1))
     count = before + gap + after
     hole = slice(before, before + gap)
     known, pins = np.ones((batch, count, COUNT + 1), np.float32), np.zeros((batch, count, COUNT), bool)
@@ -281,8 +287,10 @@ class Losses:
             answer.contact[:, 1:], stands, reduction="none"
         ).mean(dim=2)
         error = off.detach().mean(dim=2)
+        # Nothing else than zero has no gradient of its root.
+        pose = off.square().mean(dim=2).clamp(min=1e-10).sqrt() if self.settings.together else off.mean(dim=2)
         return {
-            "position": mean(off.mean(dim=2) + 0.5 * (said - placed)[:, :, 0].norm(dim=-1)),
+            "position": mean(pose + 0.5 * (said - placed)[:, :, 0].norm(dim=-1)),
             "rotation": mean(columns.abs().mean(dim=(2, 3))),
             "velocity": mean(moved),
             "slide": mean(slid),
