@@ -143,6 +143,26 @@ def test_fingers_keep_their_mean_pose(cmu_walk, hands):
     assert np.ptp(there.rotation[:, finger], axis=0).max() < 1e-12
 
 
+def test_fingers_of_one_name_that_rest_alike_move_along(hands):
+    """Of a rig that is the same but for its feet; those that rest otherwise stay."""
+    skeleton = hands.skeleton
+    names = ["mixamorig:LeftHandIndex2", "mixamorig:RightHandIndex2"]
+    left, right = (skeleton.index(name) for name in names)
+    bend = rotations.about("Z", np.sin(np.arange(len(hands)) / 5))
+    moving = hands.rotation.copy()
+    for finger in (left, right):
+        moving[:, finger] = rotations.multiply(moving[:, finger], bend)
+    bones = skeleton.rest_translation.copy()
+    toes = [find_mapping(skeleton)[side + "Toe"] for side in ("Left", "Right")]
+    tilted = rotations.about("X", np.array(np.radians(25.0)))
+    bones[toes] = rotations.rotate(tilted, bones[toes])
+    bones[right] = rotations.rotate(rotations.about("Z", np.array(np.radians(40.0))), bones[right])
+    other = replace(hands, skeleton=replace(skeleton, rest_translation=bones))
+    there = retarget(hands.with_motion(moving, hands.translation), other)
+    assert np.allclose(there.rotation[:, left], moving[:, left])
+    assert np.ptp(there.rotation[:, right], axis=0).max() < 1e-12
+
+
 def test_a_root_goes_along_if_it_does_so_there(cmu_walk, hands):
     """Game engines hang the hips from a root on the floor; with root motion it goes where the body goes."""
     skeleton = hands.skeleton

@@ -10,9 +10,10 @@ from tests.skeletons.rigs import six_channels, under_root
 
 from interpose.clip import Clip, Skeleton
 from interpose.formats import load
+from interpose.geometry import rotations
 from interpose.observation.timeline import Placement, lay
 from interpose.skeletons.carrier import carriers, hips_of
-from interpose.skeletons.fitting import fit
+from interpose.skeletons.fitting import fit, other_rig
 
 
 @pytest.fixture(scope="module")
@@ -101,6 +102,18 @@ def test_short_bones_with_positions_of_their_own_point_nowhere(cmu_walk):
             replace(walk, skeleton=replace(walk.skeleton, rest_translation=bones), translation=places)
         )
     assert np.array_equal(fit(*rigs)[0].translation, rigs[0].translation)
+
+
+@pytest.mark.parametrize(("angle", "same"), [(8.0, True), (12.0, False)])
+def test_feet_that_rest_otherwise_are_those_of_another_rig(cmu_walk, angle, same):
+    """Their toes would sink; arms may differ by more, as people's do."""
+    for names, alike in ((("LeftToeBase", "RightToeBase"), same), (("LeftForeArm",), True)):
+        bones = cmu_walk.skeleton.rest_translation.copy()
+        joints = [cmu_walk.skeleton.index(name) for name in names]
+        across = rotations.normalize(np.cross(bones[joints], [0.0, 0.3, 1.0]))
+        bones[joints] = rotations.rotate(rotations.exp(np.radians(angle) * across), bones[joints])
+        other = replace(cmu_walk, skeleton=replace(cmu_walk.skeleton, rest_translation=bones))
+        assert (other_rig(cmu_walk, other) is None) == alike
 
 
 def test_joints_in_another_order_are_found(cmu_walk):

@@ -228,6 +228,8 @@ def test_every_task_is_drawn_and_leaves_something_to_go_by():
     assert any(task.noisy.any() for task in seen)
     alone = draw_task(rng, BaseSettings(tasks="gap"), 8).known
     assert (alone == alone[:1]).all()
+    usual = [draw_task(rng, BaseSettings(tasks="gap", usual=1), 2).known[0, :, 0] for _ in range(20)]
+    assert all(known[:10].all() and not known[10:-1].any() and known[-1] for known in usual)
     assert set(TASKS) == {"all", "parts", "gap"}
     assert TASKS["all"].keys() == TASKS["parts"].keys()
     assert all(sum(odds.values()) == pytest.approx(1) for odds in TASKS.values())
@@ -541,6 +543,31 @@ def test_losses_are_of_what_is_wrong(drawn):
     least = parts(shift=0.001, risk=best)["risk"]
     assert least < parts(shift=0.001, risk=best - 1)["risk"]
     assert least < parts(shift=0.001, risk=best + 1)["risk"]
+
+
+def test_joints_of_a_pose_count_each_by_itself_or_together(drawn):
+    """One that is far off counts more than all that are off a little, where they count together."""
+    known = torch.ones(2, 40, COUNT + 1)
+    known[:, 10:30] = 0
+    placed = drawn.positions()
+    answer = Answer(
+        Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root),
+        torch.zeros(2, 40, len(FEET)),
+        torch.zeros(2, 40),
+    )
+    one, all_alike = placed.clone(), placed.clone()
+    one[:, :, 5, 0] += 0.22
+    all_alike[..., 0] += 0.01
+    all_alike[:, :, 0] = placed[:, :, 0]  # the hips count apart
+    off = {}
+    for together in (0, 1):
+        losses = Losses(BaseSettings(together=together))
+        for name, truth in (("one", one), ("all", all_alike)):
+            said = losses.parts(answer, drawn.rotation, truth, known, drawn.bones)
+            off[name, together] = float(said["position"])
+    assert off["one", 0] == pytest.approx(0.01, abs=1e-4)
+    assert off["all", 0] == pytest.approx(off["all", 1], rel=0.05)
+    assert off["one", 1] == pytest.approx(0.22 / np.sqrt(COUNT), abs=1e-3)
 
 
 def test_a_batch_is_as_hard_as_its_starting_point_is_wrong(drawn):

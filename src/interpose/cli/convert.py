@@ -54,7 +54,8 @@ def convert(
         to: of folders: the format that clips are written in; that of --onto, or else their own, without it.
         fps: frames a second of what is written.
         onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
-            as its legs are long. Fingers, and what else is no joint of every humanoid, keep their mean pose.
+            as its legs are long. Fingers, and what else is no joint of every humanoid, move along if
+            they have the same name there and rest alike, and else keep their mean pose.
         drop_repeated: take out whole frames that are the one before, as `interpose scan` finds them, and
             spread the others over the time: 24 frames a second in a file of 30 move evenly.
         json: print JSON for other programs.

@@ -22,7 +22,7 @@ from interpose.methods.bodies import RESTS
 from interpose.observation import Observation
 from interpose.skeletons import BONES, JOINTS, PARENTS, Humanoid, find_humanoid, find_mapping
 from interpose.skeletons.carrier import rooted
-from interpose.skeletons.fitting import fit, other_rig
+from interpose.skeletons.fitting import fit, other_rig, shared
 from interpose.skeletons.humanoid import SHORT
 from interpose.skeletons.targets import seated
 
@@ -47,8 +47,9 @@ def retarget(clip: Clip, like: Clip) -> Clip:
     """The motion of a clip on the skeleton of another one.
 
     Clips of one rig, people's sizes apart, keep the local rotations of all joints. Else joints that are not
-    among the 22 canonical ones (fingers, twists) are as in `like` in the mean, but a root above the hips goes
-    and turns along, and targets sit on feet and hands, as they do there. Floors are at height 0, and clips
+    among the 22 canonical ones (fingers, twists) do so where they have the same name and rest alike, and are
+    as in `like` in the mean where they do not; a root above the hips goes and turns along, and targets sit on
+    feet and hands, as they do there. Floors are at height 0, and clips
     begin over the same floor point.
 
     Args:
@@ -111,7 +112,11 @@ def _brought(clip: Clip, like: Clip) -> Clip:
     points /= mine.scale
     held = rotations.normalize(rotations.continuous(like.rotation).mean(axis=0))
     frames = len(clip), 1, 1
-    base = like.with_motion(np.tile(held, frames), np.tile(like.translation.mean(axis=0), frames))
+    held = np.tile(held, frames)
+    if theirs.left_handed == mine.left_handed:
+        for own, other in shared(clip, like):  # of which all stay that are not canonical
+            held[:, own] = clip.rotation[:, other]
+    base = like.with_motion(held, np.tile(like.translation.mean(axis=0), frames))
     base = replace(base, fps=clip.fps)
     root, goals = mine.root_over(points, turned[:, 0]), points[:, tips] * mine.hand
     # Ways go by the legs from where they begin, so that who starts beside something still does.

@@ -287,7 +287,7 @@ class Losses:
             answer.contact[:, 1:], stands, reduction="none"
         ).mean(dim=2)
         error = off.detach().mean(dim=2)
-        # Nothing else than zero has no gradient of its root.
+        # The root has no gradient at zero.
         pose = off.square().mean(dim=2).clamp(min=1e-10).sqrt() if self.settings.together else off.mean(dim=2)
         return {
             "position": mean(pose + 0.5 * (said - placed)[:, :, 0].norm(dim=-1)),
