@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from pathlib import Path
 
 from cyclopts import (
@@ -49,19 +50,23 @@ def run(tokens: list[str]) -> int:
                 result_action="return_value",
             )
     except CycloptsError as error:
-        raise translate(error) from None
+        raise translate(error, tokens) from None
     return code if isinstance(code, int) else 0
 
 
-def translate(error: CycloptsError) -> RequestError:
+def translate(error: CycloptsError, tokens: Sequence[str]) -> RequestError:
     """What is wrong with a command line, in the words of all other errors."""
-    verb = " ".join(["interpose", *(error.command_chain or ())])
+    chain = error.command_chain or ()
+    verb = " ".join(["interpose", *chain])
     see = f"{verb} --help explains it."
-    if isinstance(error, UnknownCommandError):
-        known = [name for name in error.app or () if not name.startswith("-")]
-        name = (error.unused_tokens or [""])[0]
+    verbs = [name for name in error.app or () if not name.startswith("-")]
+    # A verb with verbs of its own may do something without one: what stands in their place is none of these.
+    name = next(iter(tokens[len(chain) :]), "-")
+    misspelt = isinstance(error, MissingArgumentError) and verbs and not name.startswith("-")
+    if isinstance(error, UnknownCommandError) or misspelt:
+        name = (error.unused_tokens or [name])[0]
         return RequestError(
-            f"unknown verb: {name}", f"{verb} knows: {', '.join(known)}", _near(name, known) + see
+            f"unknown verb: {name}", f"{verb} knows: {', '.join(verbs)}", _near(name, verbs) + see
         )
     if isinstance(error, UnknownOptionError):
         name = error.token.keyword or error.token.value
@@ -76,7 +81,7 @@ def translate(error: CycloptsError) -> RequestError:
         if given:
             dashed = f"Write {given}=VALUE if that begins with a dash. "
             return RequestError(f"{given} is incomplete", "no value follows it", dashed + see)
-        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without", see)
+        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without it", see)
     if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
         kinds: dict[object, str] = {int: "a whole number", float: "a number"}
         why = f"its value must be {kinds[error.target_type]}" if error.target_type in kinds else str(error)
