@@ -286,6 +286,21 @@ hip=Hips
     lPectoral
 """
 
+# With joints of its semi-standard: twists within the arms, and legs once more.
+MMD = """
+全ての親
+  センター=Hips
+    上半身=Spine > 上半身2=Spine2
+      首=Neck > 頭=Head
+        左目
+      左肩P > 左肩=Shoulder > 左肩C > 左腕=Arm > 左腕捩 > 左ひじ=ForeArm > 左手捩 > 左手首=Hand
+        親指 人指 中指 薬指 小指: 左*１ > 左*２ > 左*３
+    下半身
+      左足=UpLeg > 左ひざ=Leg > 左足首=Foot > 左つま先=Toe
+      腰キャンセル左 > 左足D > 左ひざD > 左足首D > 左足先EX
+  左足IK親 > 左足ＩＫ > 左つま先ＩＫ
+"""
+
 CHILD = """
 Hips=Hips
   LeftUpLeg=UpLeg > LeftLeg=Leg > LeftFoot=Foot
@@ -312,6 +327,7 @@ RIG = {
     "rigify": Rig(RIGIFY, (r"\.L", ".R"), "Y", prefix="DEF-"),
     "rigify_root": Rig("\nroot" + indent(RIGIFY, "  "), (r"\.L", ".R"), "Y"),
     "daz": Rig(DAZ, ("^l(?=[A-Z])", "r"), "a"),
+    "mmd": Rig(MMD, ("左", "右"), "a", size=0.9),
     "child": Rig(CHILD, ("Left", "Right"), "Z", size=0.5),
 }
 RIGS: tuple[str, ...] = tuple(RIG)

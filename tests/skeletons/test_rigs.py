@@ -14,6 +14,7 @@ JOINT_COUNTS = {"mixamo": 65, "smpl": 24, "smplx": 55, "xsens_mvn": 23, "charact
 JOINT_COUNTS |= {"unity": 55, "makehuman": 163, "child": 15}
 MISSING = {
     "optitrack": {"Spine1"},
+    "mmd": {"Spine1"},
     "child": {"Spine1", "Spine2", "Neck", "LeftShoulder", "RightShoulder", "LeftToe", "RightToe"},
 }
 LEGS = [(side + a, side + b) for side in ("Left", "Right") for a, b in (("UpLeg", "Leg"), ("Leg", "Foot"))]

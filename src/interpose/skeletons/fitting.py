@@ -166,7 +166,8 @@ def _matched(clip: Clip, like: Clip) -> list[int]:
     )
     apart = _apart(like, clip, list(range(len(mine))), order)
     bound = np.full(len(mine), SAME)
-    bound[[toe for side in ("Left", "Right") if (toe := find_mapping(mine)[side + "Toe"]) is not None]] = FOOT
+    body = find_mapping(like.skeleton)
+    bound[[toe for side in ("Left", "Right") if (toe := body[side + "Toe"]) is not None]] = FOOT
     worst = int((apart / bound).argmax())
     if above != theirs:
         odd = [name for name, a, b in zip(mine.names, above, theirs) if a != b]

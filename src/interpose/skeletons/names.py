@@ -3,12 +3,13 @@
 Names are cut into words (`mixamorig:LeftUpLeg` into left, up, leg; `CC_Base_L_Thigh` into cc, base, l,
 thigh), words that only name the tool are dropped, and what is left is looked up. Known are LAFAN1, CMU and
 other BVH conversions, ASF/AMC of CMU and HDM05, Bandai-Namco, Mixamo, HumanIK and Vicon, Unreal, Unity, VRM,
-SMPL and SMPL-X, Rokoko, Xsens, OptiTrack, Biped, Character Creator, Daz, MakeHuman and Rigify.
+SMPL and SMPL-X, Rokoko, Xsens, OptiTrack, Biped, Character Creator, Daz, MakeHuman, Rigify and MikuMikuDance.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from dataclasses import dataclass
 
 # What words mean. "shoulder", "leg", "foot" and "hip" mean different joints in different tools: the chain
@@ -62,6 +63,38 @@ TOOLS, EXTRAS = set(_TOOLS.split()), set(_EXTRAS.split())
 CUT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 
 
+# MikuMikuDance's names are Japanese; longer words stand before those that they hold. Its second legs, which
+# carry what the first ones do plus inverse kinematics, end in D: they are none of the body's.
+JAPANESE = {
+    "全ての親": "root",
+    "下半身": "pelvis share",
+    "上半身": "spine",
+    "センター": "cog",
+    "グルーブ": "cog",
+    "腰キャンセル": "share",
+    "足首": "ankle",
+    "手首": "wrist",
+    "手捩": "forearm twist",
+    "腕捩": "arm twist",
+    "つま先": "toe",
+    "足先": "toe share",
+    "ひざ": "knee",
+    "ひじ": "elbow",
+    "親指": "thumb",
+    "人指": "index",
+    "中指": "middle",
+    "薬指": "ring",
+    "小指": "pinky",
+    "左": "left",
+    "右": "right",
+    "目": "eye",
+    "腰": "hips",
+    "肩": "collar",
+    "腕": "arm",
+    "足": "thigh",
+    "首": "neck",
+    "頭": "head",
+}
 DEFORMS = re.compile(r"DEF\W")  # how names of bones begin that deform, beside those that move them (Rigify)
 
 
@@ -74,7 +107,11 @@ class Said:
 
 
 def words(name: str) -> list[str]:
-    """The words of a name, in lower case, without its namespace and what stands in brackets."""
+    """The words of a name, in lower case and English, without its namespace and what stands in brackets."""
+    if not name.isascii():
+        name = unicodedata.normalize("NFKC", name)  # letters and numbers may be wide ones
+        for japanese, english in JAPANESE.items():
+            name = name.replace(japanese, f" {english} ")
     return [word.lower() for word in CUT.findall(re.sub(r"\[.*?\]", "", re.split(r"[:|]", name)[-1]))]
 
 
