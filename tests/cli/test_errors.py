@@ -81,10 +81,15 @@ def test_an_input_is_asked_for(run, verb):
     assert f"interpose {verb} --help" in done.err
 
 
-def test_a_verb_that_does_not_exist(run):
-    done = run("fil", "take.bvh")
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [("fil take.bvh", "fill"), ("bench lafan2", "lafan1"), ("train bsae --out run", "base")],
+)
+def test_a_verb_that_does_not_exist(run, words, meant):
+    """Also in place of the verb of one that does something without any, as `train` does."""
+    done = run(*words.split())
     assert done.code == 2
-    assert "Did you mean fill" in three_lines(done.err)[2]
+    assert f"Did you mean {meant}" in three_lines(done.err)[2]
 
 
 def damaged(take: Path, kind: str) -> None:
