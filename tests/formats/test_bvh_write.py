@@ -77,6 +77,21 @@ def test_units_axes_and_line_ends_survive(tmp_path, make_bvh, body, up):
         assert motion_lines(path)[frame] == motion_lines(tmp_path / "b.bvh")[frame]
 
 
+def test_who_lies_may_be_read_back_standing_and_it_is_said(cmu_walk, tmp_path):
+    """A few seconds of somebody who lies look like another axis up; told which it is, they are the same."""
+    turn = rotations.about("X", np.array(np.pi / 2))
+    rotation, translation = cmu_walk.rotation.copy(), rotations.rotate(turn, cmu_walk.translation)
+    rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+    lies = cmu_walk.with_motion(rotation, translation)
+    for clip in (lies, replace(lies, source=None)):
+        (said,) = formats.save(clip, tmp_path / "lies.bvh", force=True)
+        assert "--up=y" in said
+        back = formats.load(tmp_path / "lies.bvh", up="y")
+        np.testing.assert_allclose(back.positions(), lies.positions(), atol=1e-4)
+        assert not formats.save(back, tmp_path / "again.bvh", force=True), "it was given"
+    assert not formats.save(cmu_walk, tmp_path / "walk.bvh")
+
+
 def test_curves_do_not_jump(tmp_path, make_bvh):
     """Angles written for a joint that turns on and on through gimbal lock and half turns stay continuous."""
     joints = [("Root", 0, (0, 0, 0), "xyzZXY"), ("Tip", 1, (0, 170, 0), "ZXY")]

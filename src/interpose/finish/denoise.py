@@ -3,7 +3,10 @@
 The noise of a value is told by its fourth differences, in which captured motion all but vanishes. Each
 signal is then smoothed as far as Stein's unbiased estimate of the risk says that it gains: a clean one not at
 all. Turns are smoothed first, then the positions of the joints, which errors of single turns add up to, and
-the skeleton's own bones are solved back into those.
+the skeleton's own bones are solved back into those: into positions as they came where it is them that are
+noisy, and else into those of the turns that were smoothed. On 16 clips of validation performers with 1 and 3
+degrees on every turn joints are off by .75 and 1.93 cm so, and turned by 1.5 and 3.5 degrees; by 1.0 and 2.6
+cm, and 1.9 and 5.0 degrees, where positions as they came counted always.
 """
 
 from __future__ import annotations
@@ -45,6 +48,10 @@ TEMPERATURE = 8.0
 QUIET = 1e-5
 # Nor is a signal whose noise, times the strength, is less than this (metres, or of quaternions).
 NOTHING = 1e-9
+# Noise adds up along the limbs where joints, squared, tremble so many times as much as bones do: on 19 clips
+# with 1 and 3 degrees of noise on turns it is 2.3 times and more, with 1 to 9 cm on positions .7 to 1.5. What
+# trembles by less than this in the mean (metres) is clean, and positions are as good as they came.
+ADDS_UP, TINY = 1.9, 0.001
 # A joint whose position trembles by more than this (metres) is shaky: where it is further from the median of
 # so many frames on either side than so many deviations, it is brought as near. Measured on validation
 # performers with noise of 6.25 cm: that halves the largest jumps of velocities, and the error falls by 3 %.
@@ -292,7 +299,8 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     noise = strength * noise
     shaky = max(SHAKY, QUICK * (AROUND / clip.fps) ** 2)
     near = np.where(noise > shaky, FAR * noise, np.inf)
-    places = smoothed(_bounded(clip.positions(), near)[:, joints], clip.fps, strength)
+    source = still if _adds_up(clip, joints) else clip
+    places = smoothed(_bounded(source.positions(), near)[:, joints], clip.fps, strength)
     done = solve(still, known, joints, places)
     unsteady = noise[feet.ends(skeleton)].max(initial=0.0)
     if unsteady <= UNSTEADY:
@@ -300,6 +308,17 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     # The heights of real feet are known as well as the rest: lifted clear of a floor, with 2 cm of noise they
     # are off by up to 12 cm in punches of CMU's, else by 6.
     return feet.plant(done, known, (0, len(done)), step=max(STANCE, STRAYS * unsteady), lift=False)
+
+
+def _adds_up(clip: Clip, joints: Sequence[int]) -> bool:
+    """Whether noise adds up from joint to joint, as that of turns does: then positions are best told by turns
+    that are smoothed. Noise of positions is each joint's own: a bone trembles by what both of its ends do."""
+    above = [next((j for j in clip.skeleton.ancestors(joint) if j in joints), -1) for joint in joints]
+    pairs = np.array([both for both in zip(joints, above) if both[1] >= 0], int)
+    child, parent = pairs.reshape(-1, 2).T
+    places = clip.positions()
+    ends, bones = deviation(places[:, child]), deviation(places[:, child] - places[:, parent])
+    return bool(ends.sum() > TINY * len(ends) and (ends**2).sum() > ADDS_UP * (bones**2).sum())
 
 
 def _bounded(positions: np.ndarray, near: np.ndarray) -> np.ndarray:

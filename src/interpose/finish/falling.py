@@ -50,7 +50,8 @@ def landed(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         return clip
     grown, fps = feet.size(clip.skeleton), clip.fps
     placed = clip.positions() / grown
-    rests, clear = _above(placed, clip, known)
+    rests = resting(placed, clip, known)
+    clear = above(placed, rests, clip)
     height = placed[:, list(find_mapping(clip.skeleton).mapped[1]), 1].mean(axis=1)
     gravity = GRAVITY / grown / fps**2
     rate = _flies(height[:start], clear[:start], gravity, fps)
@@ -74,17 +75,22 @@ def landed(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         down[lands:] = np.minimum(eased, clear)[lands:]
     fast = max(0.0, -(rate - gravity * lands) * fps) * (lands < len(time))
     gives = np.minimum(fast, DEEPEST * np.e / GIVES) * since * np.exp(-since / GIVES)
-    return _lowered(clip, grown * down, grown * gives, grown * rests[start:], start)
+    return lowered(clip, grown * down, grown * gives, grown * rests[start:], start)
 
 
-def _above(placed: np.ndarray, clip: Clip, known: Observation) -> tuple[np.ndarray, np.ndarray]:
-    """(F, L, 2) the heights at which ankles and toes rest, and (F,) how far the lowest joint is above the
-    floor."""
+def resting(placed: np.ndarray, clip: Clip, known: Observation) -> np.ndarray:
+    """(F, L, 2) the heights at which ankles and toes rest, of places (F, J, 3)."""
     pairs = feet.pairs(clip.skeleton)
-    rests = feet.local_floor(placed[:, pairs], known.positions(clip.skeleton)[:, pairs], clip.fps)
+    return feet.local_floor(placed[:, pairs], known.positions(clip.skeleton)[:, pairs], clip.fps)
+
+
+def above(placed: np.ndarray, rests: np.ndarray, clip: Clip) -> np.ndarray:
+    """(F,) how far the lowest joint of places (F, J, 3) is above the floor, on which ankles and toes rest at
+    heights (F, L, 2)."""
+    pairs = feet.pairs(clip.skeleton)
     others = [j for j in find_mapping(clip.skeleton).mapped[1] if j not in pairs]
     low = (placed[:, pairs, 1] - rests).reshape(len(placed), -1).min(axis=1)
-    return rests, np.minimum(low, placed[:, others, 1].min(axis=1) - rests.min(axis=(1, 2)))
+    return np.minimum(low, placed[:, others, 1].min(axis=1) - rests.min(axis=(1, 2)))
 
 
 def _flies(height: np.ndarray, clear: np.ndarray, gravity: float, fps: float) -> float | None:
@@ -104,7 +110,7 @@ def _flies(height: np.ndarray, clear: np.ndarray, gravity: float, fps: float) ->
     return float(rises[-1])
 
 
-def _lowered(clip: Clip, down: np.ndarray, gives: np.ndarray, rests: np.ndarray, start: int) -> Clip:
+def lowered(clip: Clip, down: np.ndarray, gives: np.ndarray, rests: np.ndarray, start: int) -> Clip:
     """The clip let down by `down` (n,) metres from frame `start` on, and by `gives` (n,) more above its feet.
 
     rests: (n, L, 2) metres, what ankles and toes stay above.

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, jumps, notes, penetration
+from interpose.finish import feet, hanging, jumps, notes, penetration
 from interpose.finish.report import GapReport, Provenance
 from interpose.finish.span import Span
 from interpose.geometry import measures, rotations
@@ -76,6 +76,7 @@ def gap_report(
             *(notes.others(skeleton, gap) if networks and own else ()),
             *notes.sunk(finished, known, gap, first),
             *(notes.dull(alive, gap, first, ahead, span.method) or notes.idle(finished, known, gap, first)),
+            *hanging.hung(finished, known, gap, first),
             *notes.adrift(glide, finished, gap),
             *notes.skids(held[0] if held else None, finished, known, gap, first),
             *notes.hasty(finished, known, gap, first),

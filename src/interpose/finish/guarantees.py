@@ -17,6 +17,7 @@ from interpose.finish import (
     falling,
     feet,
     floor,
+    hanging,
     jumps,
     notes,
     pins,
@@ -196,6 +197,7 @@ class _Work:
             self.unheld.update(slides(current, self.known, span, self.gaps))
             if not layer:
                 _change(current, self.firm, span, falling.landed)
+                _change(current, self.firm, span, hanging.grounded)
             if not layer and _change(current, self.firm, span, stepping.stepped):
                 self.stepped[span.start, own] = STEPS
             elif not (own and layer and layer.stands):

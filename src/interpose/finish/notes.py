@@ -9,7 +9,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip, Skeleton
 from interpose.errors import few
-from interpose.finish import anatomy, feet, floor, jumps, seams
+from interpose.finish import anatomy, feet, floor, hanging, jumps, seams
 from interpose.finish.windows import grow
 from interpose.geometry import measures
 from interpose.geometry.time import runs
@@ -136,16 +136,19 @@ def _helps(finished: Clip, gap: Gap, what: str) -> str:
 
 
 def gliding(finished: Clip, known: Observation, gap: Gap) -> tuple[float, float | None] | None:
-    """The share of a gap's frames in which the body travels and no foot stands, and that of known frames
-    around it, None where too few are; None for what is too short, has no two legs, or moves known ones."""
+    """The share of a gap's frames in which the body travels, on no foot and in no free flight, and that of
+    known frames around it, None where too few are; None for what is too short, has no two legs, or moves
+    known ones."""
     fps, skeleton = finished.fps, finished.skeleton
     near = round(feet.NEARBY * fps)
     lo, hi = max(0, gap.start - near), min(len(finished), gap.stop + near)
     pairs, hips = feet.pairs(skeleton), hips_of(skeleton)
     if len(pairs) < 2 or gap.stop - gap.start < fps / 2 or feet.told(finished, known, gap.start, gap.stop):
         return None
-    placed, seen = finished.slice(lo, hi).positions(), known.slice(lo, hi).positions(skeleton)
+    part, told = finished.slice(lo, hi), known.slice(lo, hi)
+    placed, seen = part.positions(), told.positions(skeleton)
     found = measures.glides(placed[:, pairs], placed[:, hips], fps, feet.size(skeleton))
+    found &= ~hanging.flies(part, told)
     around = seen[:, [*pairs.ravel(), hips]].all(axis=1)
     usual = float(found[around].mean()) if around.sum() >= fps / 2 else None
     return float(found[gap.start - lo : gap.stop - lo].mean()), usual

@@ -7,7 +7,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics
-from interpose.skeletons import JOINTS, Mapping
+from interpose.skeletons import JOINTS, Mapping, find_mapping
 
 INCH = 0.0254
 # Metres, the likelier first. CMU is the scale of that data: 1/0.45 inch.
@@ -123,6 +123,17 @@ def estimate_unit(mapping: Mapping, clip: Clip) -> tuple[float, str]:
         if BODY[0] <= UNITS[name] * extent <= BODY[1]:
             return UNITS[name], f"estimated from a body of {UNITS[name] * extent:.2f} m, no legs found"
     return UNITS["cm"], "assumed, no legs found"
+
+
+def misread(clip: Clip, up: str, how: str = "") -> tuple[str, ...]:
+    """A note where a file of the clip, in which `up` is the axis that points up, would be taken for one with
+    another axis up, as a few seconds of a body that lies may be; none where that was given for it (`how`)."""
+    if how == "given" or not len(clip):
+        return ()
+    seen = clip.take(np.array(sample_frames(len(clip))))
+    if estimate_up(find_mapping(clip.skeleton), seen)[0] == "y":
+        return ()
+    return (f"read again, its axes may be mistaken, as the body lies: --up={up} (up= in Python) says it",)
 
 
 def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.formats import angles
+from interpose.formats import angles, place
 from interpose.formats.asf_amc.read import AmcSource
 from interpose.formats.changes import Lost, same_skeleton, translation_of, write_frames
 
@@ -53,6 +53,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
         return _put_motion(values, known, clip, source, start, previous, lost)
 
     write_frames(source, len(clip), put, stream, b"\r\n" if b"\r\n" in motion.raw(0, 1) else b"\n")
+    notes += place.misread(clip, source.up, source.up_how)
     return (*lost.notes(clip.skeleton.names), *notes)
 
 

@@ -32,7 +32,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     if isinstance(source, BvhSource) and same_skeleton(clip.skeleton, source.skeleton):
         return _write_changes(clip, source, stream)
     _write_new(clip, stream)
-    return ()
+    return place.misread(clip, "y")
 
 
 # Changes to the text of a file --------------------------------------------------------------------------
@@ -48,7 +48,7 @@ def _write_changes(clip: Clip, source: BvhSource, stream: BinaryIO) -> tuple[str
         return _put_motion(values, known, clip, source, start, previous, lost)
 
     write_frames(source, len(clip), put, stream, b"\r\n" if b"\r\n" in source.header.text else b"\n")
-    return lost.notes(clip.skeleton.names)
+    return (*lost.notes(clip.skeleton.names), *place.misread(clip, source.up, source.up_how))
 
 
 def _header(clip: Clip, header: Header) -> bytes:
