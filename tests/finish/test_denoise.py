@@ -90,6 +90,17 @@ def test_dropped_joints_come_back(cmu_walk, probability):
     assert (done.provenance == Provenance.METHOD).sum() == done.report.noise.broken
 
 
+def test_a_joint_that_drops_out_all_the_time_does_not_rest(cmu_walk):
+    """Nowhere is there data for longer than a spike lasts: it is not the rest pose that is right."""
+    leg = cmu_walk.skeleton.index("LeftUpLeg")
+    gone = np.random.default_rng(0).permutation(len(cmu_walk)) % 5 < 2
+    gone[3::4] = True
+    rotation = cmu_walk.rotation.copy()
+    rotation[gone, leg] = cmu_walk.skeleton.rest_rotation[leg]
+    done = interpose.denoise(cmu_walk.with_motion(rotation, cmu_walk.translation))
+    assert _apart(done.clip, cmu_walk).mean() < 0.3
+
+
 def test_strength_scales_from_nothing_to_smoother(cmu_walk):
     noisy = _shaken(cmu_walk, 0.5)
     nothing = interpose.denoise(noisy, 0)

@@ -35,6 +35,7 @@ MANY = 5
 # .3 m in one to three frames of LAFAN1's runs, walks and jumps 353 are found so, by medians half of them.
 SPIKE, TIMES = 0.35, 10.0
 SPIKE_WAY, BENT = 0.1, 0.4
+SPIKES = 0.25  # share of the frames from which on there are more of them than spikes: data drops out there
 AROUND = 3  # frames on either side: what lasts longer than these is no spike
 # Which of the frames from the first to the last one are gone, of one run and of two near each other.
 HOP = [np.ones(run, bool) for run in range(1, AROUND + 1)]
@@ -243,7 +244,8 @@ def _snaps(values: np.ndarray, home: np.ndarray, longest: int) -> np.ndarray:
     away = np.flatnonzero(far > SAME)
     if not 4 <= len(away) < len(values):
         return snapped
-    if max(stop - start for start, stop in runs(far > SAME)) <= AROUND:
+    longest_away = max(stop - start for start, stop in runs(far > SAME))
+    if longest_away <= AROUND and len(away) < SPIKES * len(values):
         return snapped  # it rests there, and what is elsewhere are spikes
     far = far[away]
     # The steps, a frame, between values that are not at home: before and after each of them.
