@@ -257,6 +257,7 @@ def test_clips_that_are_shorter_than_gaps_may_be(walk_pack, drawn, tmp_path, wei
     assert export_base(tmp_path, [pack], tmp_path / "weights", ["train"]).max_gap == 172, (
         "of 192 that it sees"
     )
+    train_base([pack], tmp_path / "pace", Budget.parse("2steps"), replace(long_ones, pace=0.5), say=str)
     poses = Poses([pack], ("train",), ("",), 40, torch.device("cpu"))
     with pytest.raises(RequestError, match="no clip is long enough to learn from 2000 frames"):
         poses.draw(np.random.default_rng(0), 2, 2000)
@@ -543,6 +544,25 @@ def test_losses_are_of_what_is_wrong(drawn):
     least = parts(shift=0.001, risk=best)["risk"]
     assert least < parts(shift=0.001, risk=best - 1)["risk"]
     assert least < parts(shift=0.001, risk=best + 1)["risk"]
+
+
+def test_motions_are_shown_faster_and_slower(walk_pack):
+    """The same poses on the same way, at another pace: who walks gets as much further, or less far."""
+    poses = Poses([walk_pack("cmu")], ("train",), ("",), 30, torch.device("cpu"))
+
+    def paces(pace: float) -> np.ndarray:
+        found = []
+        for seed in range(12):
+            drawn = poses.draw(np.random.default_rng(seed), 64, 40, False, pace)
+            assert drawn.rotation.shape == (64, 40, COUNT, 4)
+            assert torch.allclose(drawn.rotation.norm(dim=-1), torch.ones(()), atol=1e-5)
+            found.append(float((drawn.root[:, -1] - drawn.root[:, 0]).norm(dim=-1).mean()))
+        return np.array(found)
+
+    same, other = paces(0.0), paces(0.3)
+    assert np.ptp(same) < 0.15 * same.mean()
+    assert same.mean() / 1.35 < other.min() < 0.9 * same.mean()
+    assert 1.1 * same.mean() < other.max() < 1.35 * same.mean()
 
 
 def test_joints_of_a_pose_count_each_by_itself_or_together(drawn):

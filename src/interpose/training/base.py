@@ -91,6 +91,7 @@ class BaseSettings(Settings):
         "usual": SHARE,
         "labelled": SHARE,
         "dropout": (0, 0.9),
+        "pace": SHARE,
         **dict.fromkeys(("muon", "mirror", "together", *WIRING), SWITCH),
     }
 
@@ -110,6 +111,7 @@ class BaseSettings(Settings):
     labelled: float = 0.5  # share of the motions that are told their label
     noise: float = 0.06  # metres, and radians, of the worst noise
     mirror: int = 1  # whether half of the motions are mirrored
+    pace: float = 0.0  # share by which motions are shown faster or slower, at most
     # The network's own settings.
     dropout: float = 0.0
     residual: int = 1
@@ -242,7 +244,7 @@ def draw_batch(
 ) -> tuple[Batch, Task]:
     """Motions, and what is asked of each."""
     task = draw_task(rng, settings, batch)
-    drawn = poses.draw(rng, batch, task.known.shape[1], mirror=bool(settings.mirror))
+    drawn = poses.draw(rng, batch, task.known.shape[1], mirror=bool(settings.mirror), pace=settings.pace)
     unsaid = send(rng.random(batch) >= settings.labelled, poses.device)
     drawn.label = torch.where(unsaid, 0, drawn.label)
     return drawn, task

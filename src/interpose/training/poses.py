@@ -18,6 +18,7 @@ from interpose.datasets.pack import STEP
 from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.ground import turn
+from interpose.geometry.time import sample_rotations_smooth, sample_smooth
 from interpose.skeletons import ACROSS, ACROSS_TURN, PARENTS, SIDES
 from interpose.skeletons.mirror import mirrored
 from interpose.training.device import send
@@ -108,11 +109,23 @@ class Poses:
         chosen = send(clip, self.device)
         return Batch(turned, self.root[index], self.bones[chosen], self.label[chosen])
 
-    def draw(self, rng: np.random.Generator, batch: int, length: int, mirror: bool = True) -> Batch:
-        """A random batch, half of it mirrored left to right unless said otherwise.
+    def draw(
+        self, rng: np.random.Generator, batch: int, length: int, mirror: bool = True, pace: float = 0.0
+    ) -> Batch:
+        """A random batch, half of it mirrored left to right unless said otherwise; all of it faster or slower
+        by a share of up to `pace`.
 
         Raises RequestError where no clip has `length` frames.
         """
+        if pace:
+            # No faster than the longest clip has frames for.
+            most = max(self.counts.max() - 1, length - 1) / max(length - 1, 1)
+            times = np.arange(length) * min((1 + pace) ** rng.uniform(-1, 1), most)
+            whole = self.draw(rng, batch, int(np.ceil(times[-1] - 1e-6)) + 1, mirror)
+            at = torch.from_numpy(times).to(self.device)
+            rotation = sample_rotations_smooth(whole.rotation.transpose(0, 1), at).transpose(0, 1)
+            root = sample_smooth(whole.root.transpose(0, 1), at).transpose(0, 1)
+            return Batch(rotation, root, whole.bones, whole.label)
         weight = np.maximum(self.counts - length + 1, 0)
         if not weight.any():
             raise RequestError(
