@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from interpose.clip import Clip
 from interpose.finish import hanging
 from interpose.finish.standing import GRAVITY
+from interpose.geometry import rotations
 from interpose.observation import Gap, Observation
 
 START, STOP = 30, 66  # frames, at 30 a second
@@ -84,7 +87,8 @@ def test_who_is_cut_in_the_air_falls(cmu_walk):
     """Known motion is on the way up; in the gap it stays there, and comes down as on a parachute."""
     top = START + 4
     rise = flight(16, top)
-    rise[START:STOP] = np.linspace(rise[START - 1], 0, STOP - START)
+    inside = np.linspace(0, 1, STOP - START)
+    rise[START:STOP] = rise[START - 1] * (1 - inside) + 0.25 * inside * (1 - inside)
     clip = raised(stands(cmu_walk), rise)
     done = hanging.grounded(*asked(clip))
     lands = top + 8
@@ -105,6 +109,41 @@ def test_who_hangs_beside_the_gap_or_travels_is_left_alone(cmu_walk):
     travels = raised(body, bump(0.3), FRAMES / 30 * 2.0)
     assert hanging.grounded(*asked(travels)) is travels
     assert said(travels)
+
+
+def test_beside_a_step_nobody_knows_where_the_floor_is(cmu_walk):
+    clip = raised(stands(cmu_walk), bump(0.3) + 0.3 * (FRAMES >= STOP))
+    assert hanging.grounded(*asked(clip)) is clip
+
+
+def test_who_lies_or_kneels_rests_on_flesh(cmu_walk):
+    """Upside down, with nothing but its shoulders near the floor, ten centimetres above where toes were."""
+    body = stands(cmu_walk)
+    over = rotations.about("X", np.array(np.pi))
+    rotation = body.rotation.copy()
+    inside = slice(START, STOP)
+    rotation[inside, 0] = rotations.multiply(over, rotation[inside, 0])
+    turned = body.with_motion(rotation, body.translation)
+    heights = turned.positions()[inside, :, 1].min(axis=1)
+    up = np.zeros(len(FRAMES))
+    up[inside] = 0.10 + body.positions()[0, :, 1].min() - heights
+    clip = raised(turned, up)
+    assert hanging.grounded(*asked(clip)) is clip
+    assert not said(clip)
+
+
+@pytest.mark.parametrize("fps", [5.0, 6.0, 10.0, 12.0, 60.0])
+def test_jumps_stay_at_any_frame_rate(cmu_walk, fps):
+    frames = np.arange(round(100 * fps / 30))
+    away = frames / fps - (START + STOP) / 60
+    pose = np.zeros(len(frames), int)
+    body = cmu_walk.with_motion(cmu_walk.rotation[pose], cmu_walk.translation[pose])
+    up = np.maximum(GRAVITY / 2 * (0.35**2 - away**2), 0.0)
+    clip = replace(raised(body, up), fps=fps)
+    gap = Gap(round(START * fps / 30), round(STOP * fps / 30))
+    known = Observation.from_gaps(clip, [gap])
+    assert hanging.grounded(clip, known, (gap.start, gap.stop)) is clip
+    assert not hanging.hung(clip, known, gap, 0)
 
 
 def test_at_an_end_it_is_a_matter_of_falling(cmu_walk):

@@ -92,6 +92,24 @@ def test_who_lies_may_be_read_back_standing_and_it_is_said(cmu_walk, tmp_path):
     assert not formats.save(cmu_walk, tmp_path / "walk.bvh")
 
 
+@pytest.mark.parametrize("up", ["y", "z", "x", "-y", "-z", "-x"])
+def test_it_is_said_as_the_reader_will_take_it_whatever_is_up(cmu_walk, tmp_path, up):
+    """Somebody who leans half over, so that it is close: notes are there where files are read otherwise."""
+    notes, wrong = [], []
+    for degrees in range(30, 80, 5):
+        turn = rotations.about("X", np.array(np.radians(degrees)))
+        rotation, translation = cmu_walk.rotation.copy(), rotations.rotate(turn, cmu_walk.translation)
+        rotation[:, 0] = rotations.multiply(turn, rotation[:, 0])
+        leans = replace(cmu_walk.with_motion(rotation, translation), source=None)
+        path = tmp_path / f"{degrees}.bvh"
+        formats.save(leans, path)
+        given = formats.load(path, up=up)
+        estimated = replace(given, source=replace(given.source, up_how="estimated"))
+        notes.append(bool(formats.save(estimated, tmp_path / f"{degrees}.again.bvh")))
+        wrong.append(formats.load(tmp_path / f"{degrees}.again.bvh").source.up != up)
+    assert notes == wrong
+
+
 def test_curves_do_not_jump(tmp_path, make_bvh):
     """Angles written for a joint that turns on and on through gimbal lock and half turns stay continuous."""
     joints = [("Root", 0, (0, 0, 0), "xyzZXY"), ("Tip", 1, (0, 170, 0), "ZXY")]

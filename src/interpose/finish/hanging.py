@@ -1,7 +1,8 @@
 """Nobody hangs in the air: who is aloft within a gap flies freely, or is let down.
 
 A network's answer is a mean of all that may be: of who jumps at some time or other it says that he hovers all
-the while, and of one who is cut in the air that he comes down as on a parachute.
+the while, and of one who is cut in the air that he comes down as on a parachute. Of what somebody stands on
+in the middle of a gap alone, as on a box, nothing is known: he is let down, too.
 """
 
 from __future__ import annotations
@@ -28,10 +29,12 @@ TRAVELS = 1.2
 # Seconds for which known motion nearby, within so many seconds, may hang before it is taken to do so, as on a
 # bar; and metres by which the floor may be uneven.
 MOMENT, NEAR, EVEN = 0.15, 1.0, 0.08
+# Metres above the floor below which a knee, a hip or a hand rests on it.
+FLESH = 0.12
 # Seconds over which a body is let down smoothly, and over which its height is evened out.
 SOFT, SMOOTH = 0.03, 0.04
-# Seconds of hanging that are asked about.
-LONG = 0.25
+# Seconds of hanging that are asked about; and frames a second below which a fall is told too roughly.
+LONG, SLOWEST = 0.25, 12.0
 
 
 def grounded(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
@@ -80,6 +83,8 @@ def hung(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
     span = gap.start - lo, gap.stop - lo
     if gap.joints is not None or not find_mapping(part.skeleton).usable or not feet.legs(part.skeleton):
         return []
+    if finished.fps < SLOWEST:
+        return []
     body = _Body.of(part, seen)
     hangs = np.zeros(len(part), bool)
     hangs[slice(*span)] = body.hangs()[slice(*span)]
@@ -87,7 +92,8 @@ def hung(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
     if stop - start <= LONG * finished.fps or body.used_to_hang(span):
         return []
     frames = f"frames {first + lo + start} to {first + lo + stop - 1}"
-    return [f"flagged: nothing of it touches the floor in {frames}, and it does not fall"]
+    said = f"flagged: nothing of it touches the floor in {frames}, and it does not fall"
+    return [f"{said}: unless it stands on something there, a key with a foot down helps"]
 
 
 class _Body:
@@ -106,7 +112,11 @@ class _Body:
     def __init__(self, placed: np.ndarray, clip: Clip, known: Observation) -> None:
         rests = resting(placed, clip, known)
         self.rests = np.broadcast_to(rests.min(axis=1, keepdims=True), rests.shape)
-        self.clear = above(placed, self.rests, clip)
+        # Joints other than feet lie within flesh, which touches the floor before they do.
+        others = [j for j in find_mapping(clip.skeleton).mapped[1] if j not in feet.pairs(clip.skeleton)]
+        lies = placed[:, others, 1].min(axis=1) - self.rests.min(axis=(1, 2)) < FLESH
+        clear = above(placed, self.rests, clip)
+        self.clear = np.where(lies, np.minimum(clear, 0.0), clear)
         self.height = placed[:, list(find_mapping(clip.skeleton).mapped[1]), 1].mean(axis=1)
         self.way = placed[:, place_of(clip)][:, [0, 2]]
         self.known, self.fps = known.frames, clip.fps
@@ -142,7 +152,7 @@ class _Body:
         over = np.maximum(self.clear[part], 0.0)
         line = np.interp(time, [low - 1, high], self.height[[low - 1, high]])
         rise = float((self.height[part] - line).max())
-        flight = self.gravity * (high - low + 1) ** 2 / 8
+        flight = self.gravity * max(high - low - 1, 0) ** 2 / 8  # of the frames that it surely lasts
         travels = np.linalg.norm(self.way[high] - self.way[low - 1]) * self.fps / (high - low + 1)
         if rise >= (BESIDE if from_air or into_air else WITHIN) * flight or travels > TRAVELS:
             return np.zeros(high - low)

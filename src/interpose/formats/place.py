@@ -131,16 +131,21 @@ def misread(clip: Clip, up: str, how: str = "") -> tuple[str, ...]:
     if how == "given" or not len(clip):
         return ()
     seen = clip.take(np.array(sample_frames(len(clip))))
-    if estimate_up(find_mapping(clip.skeleton), seen)[0] == "y":
+    # What is usual is the Y of the file, wherever that is in the clip.
+    place, sign = _INSIDE[up]
+    there = place[1], sign[1]
+    usual = next(name for name, (p, s) in _INSIDE.items() if (p.index(1), s[p.index(1)]) == there)
+    if estimate_up(find_mapping(clip.skeleton), seen, usual)[0] == "y":
         return ()
     return (f"read again, its axes may be mistaken, as the body lies: --up={up} (up= in Python) says it",)
 
 
-def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
+def estimate_up(mapping: Mapping, clip: Clip, usual: str = "y") -> tuple[str, str]:
     """The up axis: the one along which the lowest point of the body is where it always is, on the floor.
 
     Who crawls or lies tells little by the direction from the feet to the head, which counts as well; so does
-    a floor at 0, and that Y is usual. `clip` is in units in which the mapping's lengths are.
+    a floor at 0, and that one axis is the `usual` one, Y in files. `clip` is in units in which the mapping's
+    lengths are.
     """
     head, left, right = (mapping.joints[JOINTS.index(j)] for j in ("Head", "LeftFoot", "RightFoot"))
     if head is None or left is None or right is None:
@@ -166,7 +171,7 @@ def estimate_up(mapping: Mapping, clip: Clip) -> tuple[str, str]:
             min(most - least, STEPS)
             + OVERHEAD * (1 - way * mean[axis])
             + level * min(abs(float(np.median(low))), 1.0)
-            + UNUSUAL * (up != "y")
+            + UNUSUAL * (up != usual)
         )
     up, second = sorted(doubts, key=lambda name: doubts[name])[:2]
     sure = doubts[second] - doubts[up] > UNSURE

@@ -167,7 +167,8 @@ def _matched(clip: Clip, like: Clip) -> list[int]:
     apart = _apart(like, clip, list(range(len(mine))), order)
     bound = np.full(len(mine), SAME)
     body = find_mapping(like.skeleton)
-    bound[[toe for side in ("Left", "Right") if (toe := body[side + "Toe"]) is not None]] = FOOT
+    if body.usable and find_mapping(clip.skeleton).usable:  # else there is no other way to bring it over
+        bound[[toe for side in ("Left", "Right") if (toe := body[side + "Toe"]) is not None]] = FOOT
     worst = int((apart / bound).argmax())
     if above != theirs:
         odd = [name for name, a, b in zip(mine.names, above, theirs) if a != b]
