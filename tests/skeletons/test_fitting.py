@@ -116,6 +116,22 @@ def test_feet_that_rest_otherwise_are_those_of_another_rig(cmu_walk, angle, same
         assert (other_rig(cmu_walk, other) is None) == alike
 
 
+def test_rigs_without_arms_stay_of_one_rig(cmu_walk):
+    """There is no other way to bring the motion of one over: feet may rest as far apart as all else."""
+    skeleton = cmu_walk.skeleton
+    arms = [skeleton.index(name) for name in ("LeftShoulder", "RightShoulder")]
+    kept = [joint for joint in range(len(skeleton)) if not skeleton.below[joint, arms].any()]
+    parents = tuple(kept.index(p) if (p := skeleton.parents[joint]) >= 0 else -1 for joint in kept)
+    bones = skeleton.rest_translation[kept]
+    legs = Skeleton(tuple(skeleton.names[joint] for joint in kept), parents, bones)
+    walk = Clip(legs, cmu_walk.rotation[:, kept], cmu_walk.translation, cmu_walk.fps, cmu_walk.translated)
+    tilted = bones.copy()
+    toe = legs.index("LeftToeBase")
+    across = rotations.normalize(np.cross(bones[toe], [0.0, 0.3, 1.0]))
+    tilted[toe] = rotations.rotate(rotations.exp(np.radians(12.0) * across), bones[toe])
+    assert other_rig(walk, replace(walk, skeleton=replace(legs, rest_translation=tilted))) is None
+
+
 def test_joints_in_another_order_are_found(cmu_walk):
     skeleton = cmu_walk.skeleton
     # Legs after arms: parents still come before their children.
