@@ -87,10 +87,15 @@ def resting(placed: np.ndarray, clip: Clip, known: Observation) -> np.ndarray:
 def above(placed: np.ndarray, rests: np.ndarray, clip: Clip) -> np.ndarray:
     """(F,) how far the lowest joint of places (F, J, 3) is above the floor, on which ankles and toes rest at
     heights (F, L, 2)."""
+    low = (placed[:, feet.pairs(clip.skeleton), 1] - rests).reshape(len(placed), -1).min(axis=1)
+    return np.minimum(low, others_above(placed, rests, clip))
+
+
+def others_above(placed: np.ndarray, rests: np.ndarray, clip: Clip) -> np.ndarray:
+    """(F,) the same of the lowest joint of the body that is no ankle or toe."""
     pairs = feet.pairs(clip.skeleton)
     others = [j for j in find_mapping(clip.skeleton).mapped[1] if j not in pairs]
-    low = (placed[:, pairs, 1] - rests).reshape(len(placed), -1).min(axis=1)
-    return np.minimum(low, placed[:, others, 1].min(axis=1) - rests.min(axis=(1, 2)))
+    return np.asarray(placed[:, others, 1].min(axis=1) - rests.min(axis=(1, 2)))
 
 
 def _flies(height: np.ndarray, clear: np.ndarray, gravity: float, fps: float) -> float | None:

@@ -12,7 +12,7 @@ from scipy import ndimage
 
 from interpose.clip import Clip
 from interpose.finish import feet
-from interpose.finish.falling import above, lowered, resting
+from interpose.finish.falling import above, lowered, others_above, resting
 from interpose.finish.standing import GRAVITY
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
@@ -48,7 +48,7 @@ def grounded(clip: Clip, known: Observation, span: tuple[int, int]) -> Clip:
         return clip
     if not feet.legs(clip.skeleton) or not find_mapping(clip.skeleton).usable:
         return clip
-    body = _Body.of(clip, known)
+    body = _Body(clip, known)
     if np.ptp(body.rests[:, 0], axis=0).max() > EVEN or body.used_to_hang(span):
         return clip
     down, hangs = np.zeros(len(clip)), body.hangs()
@@ -71,7 +71,7 @@ def flies(clip: Clip, known: Observation) -> np.ndarray:
     """(F,) where a body is in the air, and falls, or rises, freely."""
     if not find_mapping(clip.skeleton).usable or not feet.legs(clip.skeleton):
         return np.zeros(len(clip), bool)
-    body = _Body.of(clip, known)
+    body = _Body(clip, known)
     return (body.clear > ALOFT) & ~body.hangs()
 
 
@@ -85,7 +85,7 @@ def hung(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
         return []
     if finished.fps < SLOWEST:
         return []
-    body = _Body.of(part, seen)
+    body = _Body(part, seen)
     hangs = np.zeros(len(part), bool)
     hangs[slice(*span)] = body.hangs()[slice(*span)]
     start, stop = max(runs(hangs), key=lambda run: run[1] - run[0], default=(0, 0))
@@ -109,22 +109,18 @@ class _Body:
         fps: frames a second.
     """
 
-    def __init__(self, placed: np.ndarray, clip: Clip, known: Observation) -> None:
+    def __init__(self, clip: Clip, known: Observation) -> None:
+        placed = clip.positions() / feet.size(clip.skeleton)
         rests = resting(placed, clip, known)
         self.rests = np.broadcast_to(rests.min(axis=1, keepdims=True), rests.shape)
         # Joints other than feet lie within flesh, which touches the floor before they do.
-        others = [j for j in find_mapping(clip.skeleton).mapped[1] if j not in feet.pairs(clip.skeleton)]
-        lies = placed[:, others, 1].min(axis=1) - self.rests.min(axis=(1, 2)) < FLESH
+        lies = others_above(placed, self.rests, clip) < FLESH
         clear = above(placed, self.rests, clip)
         self.clear = np.where(lies, np.minimum(clear, 0.0), clear)
         self.height = placed[:, list(find_mapping(clip.skeleton).mapped[1]), 1].mean(axis=1)
         self.way = placed[:, place_of(clip)][:, [0, 2]]
         self.known, self.fps = known.frames, clip.fps
         self.gravity = GRAVITY / feet.size(clip.skeleton) / clip.fps**2
-
-    @classmethod
-    def of(cls, clip: Clip, known: Observation) -> _Body:
-        return cls(clip.positions() / feet.size(clip.skeleton), clip, known)
 
     def hangs(self) -> np.ndarray:
         """(F,) where it is aloft, and does not fall."""
