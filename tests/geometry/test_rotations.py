@@ -67,6 +67,9 @@ def test_matrix_and_6d(kind):
     q = quaternions()
     # Half turns about every axis are where a naive matrix-to-quaternion conversion divides by zero.
     q = np.concatenate([q, np.eye(4), [[0, 0.6, 0.8, 0], [1e-9, 0, 1, 0]]])
+    # And the 80 whose components are alike or missing, of either sign: none may cancel out another.
+    alike = np.stack(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 4), axis=-1).reshape(-1, 4)
+    q = np.concatenate([q, rotations.normalize(alike[np.any(alike, axis=1)])])
     m = rotations.to_matrix(kind.array(q))
     np.testing.assert_allclose(kind.numpy(m), scipy(q).as_matrix(), atol=kind.tolerance)
     assert distance(kind.numpy(rotations.from_matrix(m)), q) < kind.tolerance

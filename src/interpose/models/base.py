@@ -22,6 +22,7 @@ from interpose.errors import RequestError
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
 from interpose.geometry.ground import FLOOR
+from interpose.geometry.values import wide
 from interpose.models.keys import neighbours, pick
 from interpose.skeletons import FEET, JOINTS, PARENTS
 from interpose.skeletons.body import facing
@@ -41,6 +42,10 @@ NEVER = Constant(np.append(np.tile(REST.values, (COUNT, 1)), np.zeros((1, 6)), a
 # Rows times the cosine of the first, the sine of the second and the third are turned about Y.
 FLAT, UP = Constant(np.diag([1.0, 0.0, 1.0])), Constant(np.diag([0.0, 1.0, 0.0]))
 QUARTER = Constant([[0.0, 0.0, -1.0], [0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+# Positions of a frame, joint by joint, times this: the hips, and all joints as seen from them.
+AROUND_HIPS = np.eye(3 * COUNT)
+AROUND_HIPS[:3] -= np.tile(np.eye(3), COUNT)
+FROM_HIPS = Constant(np.concatenate([np.eye(3 * COUNT)[:, :3], AROUND_HIPS], axis=1))
 # Numbers of a frame that the network sees: columns of rotations, hips, joints around them, how both move,
 # what is known, pins and whether there are any, and how near known frames are.
 SEEN = 6 * COUNT + 3 + 3 * COUNT + 3 + 3 * COUNT + (COUNT + 1) + 4 * COUNT + 4
@@ -148,22 +153,22 @@ def complete_columns(values: Tensor, known: Tensor, around: Around, rate: Tensor
     since, until, length = around.since, around.until, around.length.clamp(min=1.0)
     share = torch.where(around.length > 0, since / length, until.clamp(max=1.0))
     held = known.to(values.dtype)
-    both = (held[..., 1:] * held[..., :-1])[..., None]
-    steps = torch.cat([both * values.diff(dim=-2), both], dim=-1)
-    # Values, the step to or from the frame beside, and whether that is known, too.
     size, pad = values.shape[-1], nn.functional.pad
+    both = held[..., 1:] * held[..., :-1]
+    steps = torch.cat([wide(both, size) * values.diff(dim=-2), both[..., None]], dim=-1)
+    # Values, the step to or from the frame beside, and whether that is known, too.
     here = pick(torch.cat([values, pad(steps, (0, 0, 1, 0))], dim=-1), around.last)
     there = pick(torch.cat([values, pad(steps, (0, 0, 0, 1))], dim=-1), around.first)
     a, b = here[..., :size], there[..., :size]
     if rate is None:
-        return a + share[..., None] * (b - a)
+        return a + wide(share, size) * (b - a)
     # How far each velocity carries, and how much less of the line's way that leaves.
     left = 1 - share
     leave = here[..., -1] * since * left * left * torch.exp(-rate * since)
     meet = there[..., -1] * until * share * share * torch.exp(-rate * until)
     share = share + (meet - leave) / length
     before, after = here[..., size:-1], there[..., size:-1]
-    return a + share[..., None] * (b - a) + leave[..., None] * before - meet[..., None] * after
+    return a + wide(share, size) * (b - a) + wide(leave, size) * before - wide(meet, size) * after
 
 
 def room(known: Tensor, around: Around) -> Tensor:
@@ -203,9 +208,13 @@ class Block(nn.Module):
     def forward(self, x: Tensor, bias: Tensor | None, batch: int) -> Tensor:
         """x: (B T, width): of rows graphs add biases as they multiply; bias: (heads, T, T), added to how much
         frames attend to each other; batch: B."""
-        asked = self.ask(self.norms[0](x)).view(batch, -1, 3 * self.heads, x.shape[1] // self.heads)
-        asked = asked.transpose(1, 2)
-        query, key, value = (asked[:, i * self.heads : (i + 1) * self.heads] for i in range(3))
+        asked, width = self.ask(self.norms[0](x)), x.shape[1]
+        query, key, value = (
+            asked[:, i * width : (i + 1) * width]
+            .reshape(batch, -1, self.heads, width // self.heads)
+            .transpose(1, 2)
+            for i in range(3)
+        )
         score = (query / math.sqrt(query.shape[-1])) @ key.transpose(2, 3)
         weight = torch.softmax(score if bias is None else score + bias.to(score.dtype), dim=-1)
         told = (weight @ value).transpose(1, 2).reshape(-1, x.shape[1])
@@ -278,7 +287,8 @@ class Encoder(nn.Module):
         bias = None
         if self.apart is not None:
             frame = torch.arange(seen.shape[1], device=x.device)
-            bias = self.apart[:, frame[:, None] - frame + self.apart.shape[1] // 2]
+            apart = (frame[:, None] - frame + self.apart.shape[1] // 2).flatten()
+            bias = self.apart.T.index_select(0, apart).T.unflatten(1, (seen.shape[1], -1))
         x = x.flatten(0, 1)
         for block in self.blocks:
             x = block(x, bias, batch)
@@ -345,7 +355,8 @@ class Base(nn.Module):
         around = every.some(slice(COUNT + 1))
         rate = RATE.beside(columns) if self.config.velocities else None
         done = complete_columns(columns.transpose(1, 2), known_values, around, rate).transpose(1, 2)
-        done = torch.where(held.any(dim=1)[:, None, :, None], done, NEVER.beside(done))
+        ever = wide(held.any(dim=1).to(done.dtype), 6)[:, None]
+        done = torch.where(ever > 0, done, NEVER.beside(done))
         motion = Motion(rotations.from_6d(done[:, :, :COUNT]), done[:, :, COUNT, :3])
         globals_, placed = motion.forward(bones)
         if self.config.near:
@@ -364,12 +375,12 @@ class Base(nn.Module):
 
     def features(self, start: Start, known: Tensor, pinned: Tensor, pins: Tensor) -> Tensor:
         """(B, T, SEEN): what the network sees of the starting point, from where it is seen."""
-        placed = turned_by(start.placed - start.origin[:, None, None], start.away)
-        hips = placed[:, :, :1]
-        moving = torch.cat([hips, placed - hips], dim=2).flatten(2)
+        origin = start.origin.repeat(1, COUNT)[:, None]
+        placed = turned_by(start.placed.flatten(2) - origin, start.away)
+        moving = placed @ FROM_HIPS.beside(placed)
         steps = nn.functional.pad(moving.diff(dim=1), (0, 0, 1, 0))
         there = pins.to(placed.dtype)
-        off = there[..., None] * turned_by(pinned - start.placed, start.away)
+        off = wide(there, 3) * turned_by(pinned - start.placed, start.away)
         far = torch.stack([start.whole.since, start.whole.until], dim=-1)
         near = torch.cat([far / SECOND, 1 / (1 + far)], dim=-1)
         if not self.config.distances:
@@ -415,14 +426,14 @@ class Base(nn.Module):
             open_ = room(known.transpose(1, 2), start.around).transpose(1, 2)
         # A joint's global rotation is known if its own and all above it are.
         above = kinematics.ancestors(PARENTS).beside(open_)
-        share = (above * open_[..., None, :COUNT]).amax(dim=-1, keepdim=True)
+        share = (above * open_[..., None, :COUNT]).amax(dim=-1)
         begin = start.columns
         columns = columns.unflatten(2, (COUNT, 6))
         if not config.residual:
             columns = columns + REST.beside(columns) - begin
-        turned = rotations.from_6d(turned_by(begin + share * columns, start.back))
+        turned = rotations.from_6d(turned_by(begin + wide(share, 6) * columns, start.back))
         turned = kinematics.local_rotations(turned, PARENTS)
-        turned = torch.where(exactly[..., :COUNT, None], local, turned)
+        turned = torch.where(wide(exactly[..., :COUNT].to(local.dtype), 4) > 0, local, turned)
         way = turned_by(moved, start.back)
         if not config.residual:
             way = way + start.origin[:, None] - start.motion.root
