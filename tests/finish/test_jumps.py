@@ -103,3 +103,26 @@ def test_a_hand_that_is_lost_all_along_makes_no_lone_keys_of_other_seams(cmu_wal
     lone = seams.lone(cmu_walk, seen, np.array([89, 130]))
     hands = [cmu_walk.skeleton.index(side + "Hand") for side in ("Right", "Left")]
     assert lone[:, hands].tolist() == [[False, False], [True, False]]
+
+
+def test_an_arm_that_whips_back_is_seen_among_frames_that_jitter(cmu_walk):
+    """At 120 fps what markers jitter by is far more of a jump, from frame to frame, than what an arm does."""
+    clip = interpose.resample(cmu_walk, 120)
+    known = Observation.from_gaps(clip, [Gap(100, 160)])
+    jitter = np.random.default_rng(0).normal(scale=0.01, size=clip.translation.shape)
+    noisy = clip.with_motion(
+        clip.rotation, clip.translation + np.where(known.frames[:, None, None], jitter, 0)
+    )
+    limits = seams.limits(noisy, known)
+    bounds, span = jumps.Bounds.of(noisy, known, limits), Span(100, 160, "any")
+    assert jumps.excess(noisy, known, span, bounds, 0)[0] <= jumps.SLACK
+
+    arm, away = clip.skeleton.index("LeftArm"), np.abs(np.arange(len(clip)) - 130)
+    turned = rotations.about("Y", 1.2 * np.clip(1 - away / 8, 0, 1))
+    rotation = noisy.rotation.copy()
+    rotation[:, arm] = rotations.multiply(rotation[:, arm], turned)
+    whips = noisy.with_motion(rotation, noisy.translation)
+    excess, words, frame = jumps.excess(whips, known, span, bounds, 0)
+    assert excess > jumps.SLACK
+    assert "over 4 frames" in words
+    assert abs(frame - 130) <= 4

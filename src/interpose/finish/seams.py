@@ -71,19 +71,19 @@ def limits(clip: Clip, observation: Observation) -> np.ndarray | None:
     return most
 
 
-def own_jumps(clip: Clip, observation: Observation) -> np.ndarray:
-    """(n, J) the clip's own velocity jumps, in metres per frame squared.
+def own_jumps(clip: Clip, observation: Observation, step: int = 1) -> np.ndarray:
+    """(n, J) the clip's own velocity jumps, in metres per `step` frames squared.
 
-    Of the frames in which the position of a joint is observed together with both neighbours'; NaN for joints
-    of which it is not.
+    Of the frames in which the position of a joint is observed together with where it is `step` frames before
+    and after; NaN for joints of which it is not.
     """
-    pooled = [np.empty((0, len(clip.skeleton)), np.float32)]
-    for start in range(0, max(len(clip) - 2, 0), CHUNK):
-        stop = min(start + CHUNK + 2, len(clip))
+    pooled, wide = [np.empty((0, len(clip.skeleton)), np.float32)], 2 * step
+    for start in range(0, max(len(clip) - wide, 0), CHUNK):
+        stop = min(start + CHUNK + wide, len(clip))
         known = observation.slice(start, stop).positions(clip.skeleton)
-        known = known[:-2] & known[1:-1] & known[2:]
+        known = known[:-wide] & known[step:-step] & known[wide:]
         if known.any():
-            part = measures.acceleration(_bare(clip, observation, start, stop).positions())
+            part = measures.acceleration(_bare(clip, observation, start, stop).positions(), step)
             pooled.append(np.where(known, part, np.nan)[known.any(axis=1)].astype(np.float32))
     return np.concatenate(pooled)
 
@@ -141,13 +141,14 @@ def fade(raw: Clip, base: Clip, known: Observation, span: tuple[int, int]) -> Cl
     return _add(raw, known, span, measure)
 
 
-def jumps(motion: Clip, known: Observation, at: np.ndarray) -> np.ndarray:
-    """(n, J, 3) velocity jumps of all joints at n observed frames beside gaps, in metres per frame squared.
+def jumps(motion: Clip, known: Observation, at: np.ndarray, step: int = 1) -> np.ndarray:
+    """(n, J, 3) velocity jumps of all joints at n frames in gaps or beside them, in metres per `step` frames
+    squared.
 
     Zero for joints that are told around them, as to where they are against what carries them: what they do is
     no seam.
     """
-    before, after = at - 1, at + 1
+    before, after = at - step, at + step
     near = np.concatenate([before, at, after])
     where = motion.with_motion(motion.rotation[near], motion.translation[near]).positions()
     where = where.reshape(3, len(at), *where.shape[1:])

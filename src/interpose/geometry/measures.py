@@ -23,12 +23,13 @@ def joint_error(positions: np.ndarray, truth: np.ndarray) -> float:
     return float(np.linalg.norm(positions - truth, axis=-1).mean())
 
 
-def acceleration(positions: np.ndarray) -> np.ndarray:
-    """Velocity jumps (F - 2, ...) of positions (F, ..., 3): the length of their second difference.
+def acceleration(positions: np.ndarray, step: int = 1) -> np.ndarray:
+    """Velocity jumps (F - 2 step, ...) of positions (F, ..., 3): the length of their second difference.
 
-    In metres per frame squared; row i belongs to frame i + 1.
+    In metres per `step` frames squared; row i belongs to frame i + step.
     """
-    return np.linalg.norm(np.diff(positions, 2, axis=0), axis=-1)
+    before, here, after = positions[: -2 * step], positions[step:-step], positions[2 * step :]
+    return np.linalg.norm(before - 2 * here + after, axis=-1)
 
 
 def bone_deviation(positions: np.ndarray, parents: tuple[int, ...], lengths: np.ndarray) -> float:
