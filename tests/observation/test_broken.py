@@ -290,6 +290,25 @@ def test_what_would_throw_a_foot_about_is_not_lost(cmu_walk):
         assert _smoother(clip, alone, nothing_sure).rotation[60, ankle] != real
 
 
+def test_a_foot_that_flicks_is_lost_in_a_walk_and_not_in_a_kick(cmu_walk):
+    skeleton, frame = cmu_walk.skeleton, 60
+    thigh, ankle = (skeleton.index(name) for name in ("LeftUpLeg", "LeftFoot"))
+    around = np.arange(len(cmu_walk)) - frame
+    swing = rotations.about("X", -1.2 * np.exp(-0.5 * (around / 2) ** 2))
+    for kicks in (False, True):
+        rotation = cmu_walk.rotation.copy()
+        if kicks:
+            rotation[:, thigh] = rotations.multiply(rotation[:, thigh], swing)
+        rotation[frame, ankle] = rotations.multiply(
+            rotation[frame, ankle], rotations.about("X", np.array(0.6))
+        )
+        clip = cmu_walk.with_motion(rotation, cmu_walk.translation)
+        suspected = Observation.full(clip)
+        suspected.rotation[frame, ankle] = False
+        seen = _smoother(clip, suspected, np.zeros(rotation.shape[:2], bool))
+        assert seen.rotation[frame, ankle] == kicks
+
+
 def test_what_snaps_again_and_again_is_lost_whatever_would_be_rougher(cmu_walk, monkeypatch):
     """With half of all joints at rest in every frame there is always one that goes more smoothly as it is."""
     walk = cmu_walk.slice(1, len(cmu_walk))

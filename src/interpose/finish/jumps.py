@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -37,6 +39,7 @@ TELLS = 1.0
 SLACK = 1.02
 # Seconds.
 BEAT = 1 / 30
+Measure = Callable[[Clip, Observation, np.ndarray], np.ndarray]  # of some frames, see `seams.jumps`
 # The change of velocity (metres a second) beyond which none is softened: that is a jump in value.
 KINK = 8.0
 
@@ -172,10 +175,11 @@ def excesses(
     bounds = bounds or Bounds.untold(current.skeleton, current.fps)
     found = []
 
-    def worst(frames: np.ndarray, jump: np.ndarray, most: np.ndarray, where: str) -> None:
+    def look(frames: np.ndarray, most: np.ndarray, where: str, jumps: Measure, step: int = 1) -> None:
         if not frames.size:
             return
-        size = np.linalg.norm(jump, axis=-1)
+        # Told by the frame, over however many.
+        size = np.linalg.norm(jumps(current, known, frames), axis=-1) / step**2
         most = np.broadcast_to(most, size.shape)
         row, joint = np.unravel_index((size / most).argmax(), size.shape)
         own, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
@@ -183,14 +187,12 @@ def excesses(
         found.append((own / limit, f"{words} ({names[joint]}, frame {first + frame})", frame))
 
     edges = seams.edges(known, current.translated, (span.start, span.stop))
-    worst(edges, seams.seam_jumps(current, known, edges), bounds.at(current, known, edges), "at a seam")
-    frames = _inner(current, np.arange(span.start, span.stop))
-    worst(frames, seams.jumps(current, known, frames), bounds.peak, "inside the gap")
+    look(edges, bounds.at(current, known, edges), "at a seam", seams.seam_jumps)
+    frames = np.arange(span.start, span.stop)
+    look(_inner(current, frames), bounds.peak, "inside the gap", seams.jumps)
     if (step := beats(current.fps)) > 1 and (not found or found[-1][0] <= 1):
-        frames, where = _inner(current, frames, step), f"inside the gap, over {step} frames"
-        # Told by the frame, as all jumps are.
-        jump = seams.jumps(current, known, frames, step) / step**2
-        worst(frames, jump, np.array(bounds.beat / step**2), where)
+        most, where = np.array(bounds.beat / step**2), f"inside the gap, over {step} frames"
+        look(_inner(current, frames, step), most, where, partial(seams.jumps, step=step), step)
     return found
 
 

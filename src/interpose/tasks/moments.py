@@ -58,7 +58,7 @@ def mended(clip: Clip, observation: Observation, lost: Observation) -> tuple[Cli
     mended, straight = laid(curved, clip), laid(hidden, clip)
     # What else is missing is judged as it would be completed: what stands there now may be anything.
     pair = (laid(curved, hidden), hidden)
-    for start, stop, (rough, short) in roughness(lost.rotation | lost.translation, *pair):
+    for start, stop, _, (rough, short) in roughness(lost.rotation | lost.translation, *pair):
         if short.max() < CALMER * rough.max():
             mended.rotation[start:stop] = straight.rotation[start:stop]
             mended.translation[start:stop] = straight.translation[start:stop]
