@@ -15,6 +15,7 @@ from interpose.geometry import rotations
 from interpose.observation import Gap, Observation
 from interpose.observation.finding import Finding, to_gaps
 from interpose.observation.scan import intact, scan
+from interpose.observation.tremor import restless
 
 NAMES = ("hips", "spine", "arm", "hand", "finger")
 SKELETON = Skeleton(NAMES, (-1, 0, 1, 2, 3), np.tile([0.0, 0.3, 0], (5, 1)))
@@ -395,6 +396,14 @@ def test_a_hand_that_trembles_all_along_is_said(cmu_walk, size):
     rotation[:, hand] = rotations.multiply(rotation[:, hand], noise)
     (found,) = [one for one in scan(clip.with_motion(rotation, clip.translation)) if one.kind == "noisy"]
     assert (found.joints, found.start, found.stop) == (("LeftHand",), 0, len(clip))
+
+
+def test_a_hand_that_flaps_is_not_said_to_tremble(cmu_walk):
+    """By 90 degrees nearly five times a second, at 30 frames."""
+    rotation, hand = cmu_walk.rotation.copy(), cmu_walk.skeleton.index("RightHand")
+    flaps = 1.6 * np.sin(np.pi * np.arange(len(cmu_walk)) / 6.5) ** 4
+    rotation[:, hand] = rotations.multiply(rotation[:, hand], rotations.about("X", flaps))
+    assert not restless(cmu_walk.with_motion(rotation, cmu_walk.translation))
 
 
 @pytest.mark.parametrize(("real", "fps"), [(24, 60), (12, 60), (10, 120), (5, 60)])
