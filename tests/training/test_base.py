@@ -422,6 +422,19 @@ def test_weights_beside_the_graph(model, graph, given, tmp_path, monkeypatch):
     assert sizes[1] < sizes[0] - 40_000
 
 
+def test_a_graph_is_written_anew_from_the_weights_beside_it(trained, tmp_path):
+    folder = tmp_path / "small"
+    shutil.copytree(trained[0].path.parent, folder)
+    card = weights.load(folder, "small")
+    before, kept = card.onnx.read_bytes(), [one.read_bytes() for one in shard_paths(card.onnx)]
+    card.onnx.write_bytes(b"damaged")
+    export.rewrite(card)
+    assert card.onnx.read_bytes() == before
+    assert [one.read_bytes() for one in shard_paths(card.onnx)] == kept
+    with pytest.raises(RequestError, match="of another kind"):
+        export.rewrite(weights.find("cae"))
+
+
 def test_it_completes_clips(trained, cmu_walk, monkeypatch):
     """Gaps, joints of the whole clip, and forecasts that are longer than it can see."""
     small = method.Base("small", trained=trained[0])

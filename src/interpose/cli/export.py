@@ -92,6 +92,29 @@ def base(
 
 
 @export.command
+def graph(trained: str, /) -> None:
+    """Write the graph of base, small or weights like them anew, where they lie, from the same weights.
+
+    For those who changed how such networks compute: it says the same but for rounding,
+    and nothing is trained. The card and the weights beside it stay as they are.
+
+    Try:
+      interpose export graph small
+      interpose export graph studies/base-lafan1
+
+    Args:
+        trained: the name of installed weights, or the folder of others.
+    """
+    from interpose.methods import weights
+
+    with needs_torch("export a network"):
+        from interpose.training.export import rewrite
+    card = weights.card(trained)
+    rewrite(card)
+    say(f"wrote {card.onnx}")
+
+
+@export.command
 def cmib(
     *,
     of: Of,

@@ -147,7 +147,7 @@ def own(
         set: change a setting of the recipe: name=value. May be repeated.
     """
     with needs_torch("train a network"):
-        from interpose.training.base import JUDGED, OWN, WIRING, BaseSettings, judge, train_base
+        from interpose.training.base import JUDGED, KIN, WIRING, BaseSettings, judge, train_base
         from interpose.training.export import export_base
     from interpose.datasets.own import own_pack
     from interpose.methods import registry, weights
@@ -156,7 +156,7 @@ def own(
     from interpose.training.device import rank
 
     begin = weights.card(from_)
-    if begin.method not in OWN:
+    if begin.method not in KIN:
         raise RequestError(
             f"{from_} cannot be fine-tuned",
             f"it belongs to {begin.method}; so far only interpose's own networks can",

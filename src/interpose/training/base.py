@@ -74,7 +74,7 @@ TASKS: dict[str, dict[str, float]] = {
 
 
 # How a network is wired, which none can change that begins with another.
-OWN = ("base", "small", "small-open")  # what runs networks of this kind
+KIN = ("base", "small", "small-open")  # what runs networks of this kind
 WIRING = ("residual", "velocities", "near", "apart", "distances", "room")
 
 
@@ -343,7 +343,7 @@ def begin(settings: BaseSettings, labels: tuple[str, ...], start: Card | None) -
     asked = settings.network(labels)
     if not start:
         return Base(asked)
-    of_kind(start, *OWN)
+    of_kind(start, *KIN)
     # What a network is wired like has no weights of its own that could tell.
     wired = {**start.training["network"], "labels": labels, "dropout": settings.dropout}
     model = Base(BaseConfig(**wired))

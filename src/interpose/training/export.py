@@ -26,7 +26,7 @@ from interpose.models.seq2seq import Seq2Seq, Seq2SeqConfig
 from interpose.models.stmi_gan import Generator, StmiGanConfig
 from interpose.show.plot import line_plot
 from interpose.skeletons import JOINTS
-from interpose.training.base import JUDGED, SHORTEST, chosen, title, validate
+from interpose.training.base import JUDGED, KIN, SHORTEST, chosen, title, validate
 from interpose.training.cae import NETWORKS
 from interpose.training.graphs import (
     export_base_onnx,
@@ -35,7 +35,7 @@ from interpose.training.graphs import (
     export_seq2seq_onnx,
     export_stmi_gan_onnx,
 )
-from interpose.training.loop import restore, sizes
+from interpose.training.loop import of_kind, restore, sizes
 from interpose.training.poses import Poses
 from interpose.training.stmi_gan import DATASETS as STMI_GAN_DATASETS
 from interpose.training.stmi_gan import JUDGE
@@ -363,6 +363,19 @@ def export_base(
     )
     card.save(out / f"{name}.json")
     return card
+
+
+def rewrite(card: Card) -> None:
+    """Write the graph of `base`, `small` or weights of their kind anew, from the weights in 16 bits that lie
+    beside it: after a change of how such networks compute, which says the same but for rounding.
+
+    RequestError for weights of another kind.
+    """
+    of_kind(card, *KIN)
+    network = {**card.training["network"], "labels": tuple(card.labels), "dropout": 0.0}
+    model = Base(BaseConfig(**network))
+    restore(model, card.onnx)
+    export_base_onnx(model, card.onnx)
 
 
 def halfway(model: Base, other: Card, packs: list[Pack]) -> dict[str, float]:
