@@ -426,10 +426,15 @@ def test_a_graph_is_written_anew_from_the_weights_beside_it(trained, tmp_path):
     folder = tmp_path / "small"
     shutil.copytree(trained[0].path.parent, folder)
     card = weights.load(folder, "small")
-    before, kept = card.onnx.read_bytes(), [one.read_bytes() for one in shard_paths(card.onnx)]
+    before, kept = onnx.load(card.onnx), [one.read_bytes() for one in shard_paths(card.onnx)]
     card.onnx.write_bytes(b"damaged")
     export.rewrite(card)
-    assert card.onnx.read_bytes() == before
+    after = onnx.load(card.onnx)
+    assert after.graph.node == before.graph.node
+    for one, other in zip(after.graph.initializer, before.graph.initializer):
+        # The graph of the run itself has small ones whole.
+        values = onnx.numpy_helper.to_array(one), onnx.numpy_helper.to_array(other)
+        np.testing.assert_allclose(*values, rtol=1e-3, atol=1e-6)
     assert [one.read_bytes() for one in shard_paths(card.onnx)] == kept
     with pytest.raises(RequestError, match="of another kind"):
         export.rewrite(weights.find("cae"))
