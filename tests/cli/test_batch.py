@@ -352,6 +352,8 @@ def test_a_folder_is_converted_into_a_folder(run, takes):
     assert run("convert", "takes", "other", "--to", "npz").code == 0
     assert (takes.parent / "other" / "day" / "b.npz").exists()
     assert run("convert", "takes/a.bvh", "other").code == 0, "one clip goes into a folder, too"
+    assert run("convert", "takes/a.bvh", "-o", "c.npz").code == 0, "as other verbs say it"
+    assert run("convert", "takes/a.bvh", "-o", "c.npz").code == 2
     assert (takes.parent / "other" / "a.bvh").exists()
     assert "does not apply to one file" in run("convert", "takes/a.bvh", "a.npz", "--to", "npz").err
 

@@ -22,8 +22,8 @@ STIRS = 1e-4  # radians, or metres, from which on a joint moves
 
 def convert(
     file: Annotated[Path, Parameter(name="IN")],
-    output: Annotated[Path, Parameter(name="OUT")],
     /,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
     *,
     to: Literal["bvh", "npz", "amc"] | None = None,
     fps: float | None = None,
@@ -66,7 +66,7 @@ def convert(
     alone = not (file.is_dir() or output.is_dir())
     if to is not None and alone:
         raise RequestError(
-            "--to does not apply to one file", "the suffix of OUT says the format", "Leave it out."
+            "--to does not apply to one file", "the suffix of the output says the format", "Leave it out."
         )
     ending = to if to is not None or onto is None or alone else onto.suffix[1:].lower()
     each_of = each(_convert, earlier=_earlier)
