@@ -48,6 +48,17 @@ def test_noise_on_rotations_falls(cmu_walk):
     assert _apart(done.clip, cmu_walk).mean() < 0.5 * _apart(noisy, cmu_walk).mean()
 
 
+def test_knees_of_a_walk_are_nearer_than_they_came(cmu_walk):
+    """Feet that were held on noisy turns bent legs that are all but straight to and fro."""
+    noisy = tremble(cmu_walk, 1.0, np.random.default_rng(3))
+    knees = [cmu_walk.skeleton.index(name) for name in ("LeftLeg", "RightLeg")]
+    before, after = (
+        rotations.angle(one.rotation[:, knees], cmu_walk.rotation[:, knees]).mean()
+        for one in (noisy, interpose.denoise(noisy).clip)
+    )
+    assert after < 0.7 * before
+
+
 @pytest.mark.parametrize(("name", "most"), [("cmu_walk", 0.43), ("cmu_run", 0.55), ("cmu_jump", 0.47)])
 def test_turns_that_are_smoothed_are_not_bent_back_to_noisy_positions(data, name, most):
     """Which noise on turns adds up to: .48, .62 and .53 of it was left so."""
@@ -224,7 +235,7 @@ def test_a_foot_on_its_way_at_an_end_of_the_clip_stays_there(cmu_walk, start):
     ends = feet.ends(clip.skeleton)
     off = _apart(interpose.denoise(noisy).clip, clip)[:, ends]
     assert off[[0, -1]].max() < 1.5 * off.max(axis=1)[3:-3].max()
-    assert off[[0, -1]].max() < 8
+    assert off[[0, -1]].max() < 9
 
 
 def test_frames_that_are_noisy_among_others_are_denoised_by_their_own_noise(cmu_walk):

@@ -57,9 +57,11 @@ STEADY = 25.0
 # Seconds of gaps in which they may as far as anything: in 200 gaps of five frames of LAFAN1's validation
 # performer feet slid by 11.5 instead of 11.8 cm/s, and as many fills jumped twice as far as the truth.
 BRIEF = 0.3
-# A simpler method takes over where it pops by less than this share of what the method does: the hand of a
-# body that falls jumps with either.
-LESS = 0.9
+# A simpler method takes over where it keeps to the limits, or pops by less than this share of what the method
+# does: the hand of a body that falls jumps with either, and a knee that is lost alone under a hip that jumps.
+# Of 336 knees and ankles of CMU and HDM05 that are lost for 80 frames four gave way to a spline that jumped
+# nearly as far, and that was off by 6.0 to 26 cm instead of .8 to 6.1.
+LESS = 0.5
 
 
 @dataclass(frozen=True)
@@ -253,7 +255,7 @@ class _Work:
             write(self.current, start, span.start, (span.start, span.stop))
         self.settle(failed, other, raw)
         for span in failed:
-            # Where the simpler method pops hardly less, there is no reason to lose the motion; nor where it
+            # Where the simpler method pops as well, there is no reason to lose the motion; nor where it
             # has only the rest pose to say.
             excess, less = (
                 jumps.excess(one, known, span, bounds, ask.first)[0] for one in (own, self.current)
