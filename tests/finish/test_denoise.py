@@ -50,13 +50,13 @@ def test_noise_on_rotations_falls(cmu_walk):
 
 def test_knees_of_a_walk_are_nearer_than_they_came(cmu_walk):
     """Feet that were held on noisy turns bent legs that are all but straight to and fro."""
-    noisy = tremble(cmu_walk, 1.0, np.random.default_rng(3))
+    noisy = tremble(cmu_walk, 2.0, np.random.default_rng(3))
     knees = [cmu_walk.skeleton.index(name) for name in ("LeftLeg", "RightLeg")]
     before, after = (
         rotations.angle(one.rotation[:, knees], cmu_walk.rotation[:, knees]).mean()
         for one in (noisy, interpose.denoise(noisy).clip)
     )
-    assert after < 0.7 * before
+    assert after < 0.55 * before
 
 
 @pytest.mark.parametrize(("name", "most"), [("cmu_walk", 0.43), ("cmu_run", 0.55), ("cmu_jump", 0.47)])
