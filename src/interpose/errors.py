@@ -66,7 +66,7 @@ def unknown(kind: str, name: object, choices: object) -> RequestError:
     hint = f"Did you mean {' or '.join(near)}? " if near else ""
     return RequestError(
         f"unknown {kind}: {name}",
-        f"it is none of: {', '.join(names)}",
+        f"the choices are: {', '.join(names)}",
         f"{hint}Choose one of the names above.",
     )
 

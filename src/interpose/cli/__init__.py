@@ -29,14 +29,14 @@ VERBS = {
     "Your clips": {
         "scan": "find what looks missing: frozen runs, swapped limbs, jumps, noise",
         "fill": "fill gaps; what is not missing comes back unchanged",
-        "compare": "see what several methods make of a gap, before one is chosen",
+        "compare": "compare what several methods make of a gap",
         "between": "generate the motion between key poses",
-        "stitch": "lay clips one after another, and generate what lies between them",
+        "stitch": "join clips one after another, and generate the transitions",
         "recover": "recover joints that are missing in the whole clip or in a range",
         "denoise": "smooth noise, and fill joints that drop out or spike",
-        "forecast": "go on with a clip, in one or in several ways",
-        "skeleton": "say which joint is which: how a skeleton is understood",
-        "convert": "write a clip in another format, at another rate, on another skeleton",
+        "forecast": "continue a clip after its last frame, in one or several ways",
+        "skeleton": "show how the joints of a skeleton were identified",
+        "convert": "change the format or frame rate, or retarget to another skeleton",
     },
     "Getting to know it": {
         "demo": "see a gap filled in a real clip",
@@ -45,7 +45,7 @@ VERBS = {
     },
     "Research": {
         "bench": "measure how good the methods are, by published protocols",
-        "data": "what there is of the public data sets, and packing it for training",
+        "data": "list the public data sets that you have, and pack them for training",
         "train": "train a network (needs PyTorch: pip install 'interpose[train]')",
         "export": "turn a training run into weights with a card (needs PyTorch)",
     },
@@ -58,14 +58,14 @@ Start here:
   interpose demo                          see a gap filled in a real clip
   interpose scan take.bvh                 find what is missing in your clip
   interpose fill take.bvh --gap 120:160   fill frames 120 to 159 of it
-  interpose fill --help                   all about a verb
+  interpose fill --help                   explain one command
 
 {verbs}
 Options:
   --help, --version
   --debug   show where an error comes from (or set INTERPOSE_DEBUG=1)
 
-Frames count from 0, and a range stops before its second number.
+Frames count from 0, and the end of a range is excluded: 120:160 ends at frame 159.
 """
 
 

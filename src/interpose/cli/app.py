@@ -73,24 +73,22 @@ def translate(error: CycloptsError, tokens: Sequence[str]) -> RequestError:
         known = [name for argument in error.argument_collection for name in argument.names if argument.parse]
         if Path(name).exists():
             return RequestError(f"unknown option: {name}", "it is a file", f"Write ./{name} for the file.")
-        return RequestError(
-            f"unknown option: {name}", f"{verb} has none of that name", _near(name, known) + see
-        )
+        return RequestError(f"unknown option: {name}", f"{verb} has no such option", _near(name, known) + see)
     if isinstance(error, MissingArgumentError) and error.argument is not None:
         given = error.keyword or next((t.keyword for t in error.argument.tokens if t.keyword), None)
         if given:
             dashed = f"Write {given}=VALUE if that begins with a dash. "
             return RequestError(f"{given} is incomplete", "no value follows it", dashed + see)
-        return RequestError(f"{error.argument.name} is missing", f"{verb} cannot do without it", see)
+        return RequestError(f"{error.argument.name} is missing", f"{verb} needs it", see)
     if isinstance(error, CoercionError) and error.token is not None and error.token.keyword:
         kinds: dict[object, str] = {int: "a whole number", float: "a number"}
         why = f"its value must be {kinds[error.target_type]}" if error.target_type in kinds else str(error)
         return RequestError(f"cannot use {error.token.keyword} {error.token.value}", why, see)
     if isinstance(error, RepeatArgumentError) and error.token.keyword:
-        return RequestError(f"{error.token.keyword} stands there twice", "it takes one value", see)
+        return RequestError(f"{error.token.keyword} is given twice", "it takes one value", see)
     if isinstance(error, UnusedCliTokensError):
         extra = " ".join(error.unused_tokens or ())
-        return RequestError(f"do not know what to do with: {extra}", f"{verb} takes fewer arguments", see)
+        return RequestError(f"unexpected argument: {extra}", f"{verb} takes fewer arguments", see)
     return RequestError("the command line is wrong", str(error), see)
 
 

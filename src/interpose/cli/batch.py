@@ -25,8 +25,8 @@ PRODUCT = re.compile(rf"(.+)\.(?:{'|'.join(MADE.values())})(?:\.\d+)?")
 
 
 SKIP_EXISTING = """
-        skip_existing: leave out clips whose result is there already with its report, whatever was asked for
-            then: a batch goes on where it stopped.
+        skip_existing: skip clips that already have a result and a report, whatever the options of that run
+            were; this resumes an interrupted batch.
     """
 
 

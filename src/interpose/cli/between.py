@@ -42,14 +42,14 @@ def between(
 ) -> int:
     """Generate the motion between key poses; the keys themselves come back unchanged.
 
-    Keys are frames of one file, or poses of several: then the motion begins
-    with --start, --frames new frames follow, and --target is the last, on the
-    body of --start, to which other rigs are retargeted. How it leaves the one and
-    meets the other is told by the frames beside them in their files; both stay
-    where they are there, and `interpose stitch` places clips to go on. What lies
-    between the keys of a file has no influence; what lies before the first and
-    after the last one stays as it is. Writes the clip and a report beside the
-    input: keys.between.bvh and keys.between.json.
+    With --keys, the keys are frames of one file. What lies between them there is
+    ignored; what lies before the first and after the last one stays as it is.
+    With --start and --target, the keys are poses of several files: the result is
+    the --start pose, --frames new frames, and the --target pose, on the skeleton of
+    --start; other rigs are retargeted to it. The frames beside these poses in their
+    files set the velocities. Both poses stay where they are in their files; use
+    `interpose stitch` to place clips one after another. Writes the clip and a report
+    beside the input: keys.between.bvh and keys.between.json.
 
     Try:
       interpose between keys.bvh --keys 0,30,75
@@ -64,11 +64,10 @@ def between(
         start: FILE or FILE#FRAME: the first pose; without a frame the last one of that file.
         target: FILE or FILE#FRAME: the last pose; without a frame the first one of that file.
         frames: how many frames, or seconds, to generate between --start and --target; auto, the default,
-            proposes it (from the last anchor on).
-        anchor: FILE@AT or FILE#FRAME@AT: a pose that is to be met at frame AT; --start is frame 0. May be
-            repeated.
-        action: what the motion is; `interpose models base` lists what there is. A word does little: another
-            key says more.
+            chooses a length (after the last anchor).
+        anchor: FILE@AT or FILE#FRAME@AT: a pose to reach at frame AT; --start is frame 0. May be repeated.
+        action: an action label; `interpose models base` lists them. It has little effect: another key has
+            more.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit; --start is frame
             0. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
@@ -77,10 +76,10 @@ def between(
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), cmib, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        seed: for methods that sample.
+        seed: random seed, for methods that sample.
         player: write a page (keys.between.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import check_method, frame_of, path_of, pins_of

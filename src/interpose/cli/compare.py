@@ -42,8 +42,8 @@ def compare(
 
     Writes a page beside the input, take.compared.html, that plays them in any
     browser, and prints what each did to seams and feet. The clip itself is
-    written by `interpose fill --method`, once one is chosen. Without --gap,
-    --joints or --gaps it is about what `interpose scan` finds.
+    written by `interpose fill --method`, once you have chosen one. Without --gap,
+    --joints or --gaps it compares fills of what `interpose scan` finds.
 
     Try:
       interpose compare take.bvh --gap 120:160
@@ -60,7 +60,7 @@ def compare(
             `interpose models` lists what there is.
         output: where to write the page.
         license: open to use only weights that may be used for anything; any (the default).
-        seed: for methods that sample.
+        seed: random seed, for methods that sample.
         json: print what each did as JSON.
         force: replace an existing page.
     """

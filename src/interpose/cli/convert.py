@@ -36,9 +36,9 @@ def convert(
 ) -> int:
     """Write a clip, or all of a folder, in another format, at another frame rate, or on another skeleton.
 
-    A file that becomes one of its format again keeps its layout and units, and at the same rate every
-    number's text. Other BVH is written in centimetres, Y up. The suffix says the
-    format: .bvh, .npz, .amc (for clips read from .amc).
+    A file written in its own format keeps its layout and units, and at the same frame rate also the
+    text of every number. Other BVH is written in centimetres, Y up. The suffix gives the
+    format: .bvh, .npz, .amc (only for clips read from .amc).
 
     Try:
       interpose convert take.bvh take.npz
@@ -50,14 +50,14 @@ def convert(
 
     Args:
         file: the clip to read, or a folder of clips.
-        output: the file to write; of a folder a folder, in which each clip lies as it does in the other.
-        to: of folders: the format that clips are written in; that of --onto, or else their own, without it.
-        fps: frames a second of what is written.
-        onto: a clip of another rig, whose skeleton is to move so; feet stand where they stood, as far apart
-            as its legs are long. Fingers, and what else is no joint of every humanoid, move along if
-            they have the same name there and rest alike, and else keep their mean pose.
-        drop_repeated: take out whole frames that are the one before, as `interpose scan` finds them, and
-            spread the others over the time: 24 frames a second in a file of 30 move evenly.
+        output: the file to write; for a folder, a folder, which gets the same structure.
+        to: for folders, the format to write; default: that of --onto, or else each clip's own.
+        fps: the frame rate to write.
+        onto: a clip on another rig; the motion is retargeted to its skeleton. Planted feet stay planted, and
+            travel scales with leg length. Fingers and other joints that not every humanoid has follow if
+            they have the same name and a similar rest pose; otherwise they keep their mean pose.
+        drop_repeated: remove frames that repeat the one before, as `interpose scan` finds them, and spread
+            the others evenly over the time, as of 24 fps motion in a 30 fps file.
         json: print JSON for other programs.
         force: replace an existing file.
         skip_existing: of folders: leave out clips whose result is there already: a batch goes on where it

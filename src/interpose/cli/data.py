@@ -32,7 +32,7 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
         raise FileError(
             f"{data} is no folder",
             "the unpacked data sets are expected there",
-            "Name it with --data; docs/data.md says where to get them.",
+            "Give the folder with --data; docs/data.md says where to get the data sets.",
         )
     found: dict[str, dict[str, Any]] = {}
     for name in DATASETS:

@@ -46,19 +46,19 @@ def denoise(
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
-        more: further ones: each is done by itself.
-        strength: what the estimated noise is multiplied with: 0 changes nothing, 1 trusts it, 2 is smoother.
-        joints: only these joints may turn, separated by commas; a root also moves. All without it.
-        frames: START:STOP, only the frames START to STOP - 1 may change, counted from 0; or seconds, 4s:5.3s.
-            All without it.
+        more: more clips or folders; each clip is processed by itself.
+        strength: factor on the estimated noise: 0 changes nothing, 1 (the default) uses it, 2 is smoother.
+        joints: change only these joints, separated by commas: rotations, and a root's position. Default: all.
+        frames: START:STOP, change only the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s.
+            Default: all.
         method: what fills lost values: auto (interpolates), cae, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        seed: for methods that sample.
-        output: where to write the clip; the report goes beside it. Of several clips a folder.
+        seed: random seed, for methods that sample.
+        output: where to write the clip; the report goes beside it. With several clips: a folder.
         player: write a page (take.denoised.html) that plays the result; it opens in any browser.
         dry_run: say what is found and done, and write nothing.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import check_method, range_of

@@ -67,36 +67,36 @@ def fill(
       interpose fill take.bvh --layer --from wave.bvh --at 130
         --joints RightArm,RightHand   (that arm over the motion that is there)
 
-    Ends with 0 when all is filled, 4 when a gap stays open, or when hips or limbs are
-    left to `interpose recover`, 2 or 3 when nothing was done.
+    Exit code: 0 if all gaps were filled; 4 if a gap stays open, or if hips or limbs
+    are left for `interpose recover`; 2 or 3 if nothing was done.
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
-        more: further ones: each is done by itself.
+        more: more clips or folders; each clip is processed by itself.
         gap: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. May be repeated.
         joints: the joints missing in each --gap, or else in the whole clip; or those that --from gives.
         gaps: a JSON file of gaps, or the report of an earlier run, which is then repeated.
-        from_: another clip that gives poses of the --joints inside of a gap, named as in this one; what is of
-            another rig is retargeted.
-        from_range: START:STOP, the frames of it that are used; all without it.
-        at: the frame at which they begin.
-        layer: the --joints alone are another clip's, and eased in and out: they point where they do there, as
-            seen from where the hips face. All else stays as it is, where otherwise the whole pose of a --gap
-            is filled around them.
+        from_: another clip from which the poses of --joints (names as in this clip) are taken; if it is on
+            another rig, it is retargeted.
+        from_range: START:STOP, the frames of that clip to use; default: all.
+        at: the frame of this clip at which they begin.
+        layer: take only --joints from the other clip, eased in and out, and leave all else unchanged. They
+            point where they do there, relative to the facing of the hips. Without --layer the rest of the
+            pose in the --gap is filled around them.
         path: FRAME:X,Z (or X,Y), where the hips are to be on the floor, in the file's unit. May be repeated.
         pin: JOINT@FRAME:X,Y,Z, where a joint is to be, in the file's unit and axes; or JOINT@START:STOP:X,Y,Z
             to hold it there. @119 instead of X,Y,Z: where it is at frame 119, and turned as it is then. May
             be repeated.
-        output: where to write the filled clip; the report goes beside it. Of several clips a folder.
+        output: where to write the filled clip; the report goes beside it. With several clips: a folder.
         method: what fills the gaps: auto (the default), base, spline, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        max_gap: leave gaps of more than so many frames open, or seconds, 3s, and list them.
+        max_gap: leave gaps longer than this open, and list them; frames, or seconds, 3s.
         only_gap: fill only the gap of this number, counted from 1 in order of time. May be repeated.
-        seed: for methods that sample.
+        seed: random seed, for methods that sample.
         player: write a page (take.filled.html) that plays the result; it opens in any browser.
         dry_run: say what would be done, and write nothing.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import (

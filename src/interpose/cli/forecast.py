@@ -48,10 +48,10 @@ def forecast(
     force: bool = False,
     reading: Reading = Reading(),
 ) -> int:
-    """Go on with a clip: frames are added after its last one.
+    """Continue a clip: frames are added after its last one.
 
     The clip itself comes back unchanged. Writes take.forecast.bvh and
-    take.forecast.json; of several samples take.forecast.1.bvh, take.forecast.2.bvh
+    take.forecast.json; with several samples take.forecast.1.bvh, take.forecast.2.bvh
     and so on, and one report.
 
     Try:
@@ -62,17 +62,17 @@ def forecast(
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
-        more: further ones: each is done by itself.
-        frames: how many to add, at the clip's own rate, or seconds: 3s; 2 seconds without it.
-        samples: in how many ways it may go on, each in a file of its own; for methods that draw at random.
-        seed: of what is drawn at random. One sample without it is the most likely one.
-        temperature: how much is drawn at random, 0 to 10: 1 is what the network was trained with.
-        output: where to write the clip; the report goes beside it. Of several clips a folder.
+        more: more clips or folders; each clip is processed by itself.
+        frames: how many to add, at the clip's own rate, or seconds: 3s. Default: 2 seconds.
+        samples: number of different continuations, each in its own file; for methods that sample.
+        seed: random seed. Without it a single sample is the most likely one.
+        temperature: amount of randomness, 0 to 10: 1 is what the network was trained with.
+        output: where to write the clip; the report goes beside it. With several clips: a folder.
         method: how it is continued: auto (the default), base, stmi-gan, ...; `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
         player: write a page (take.forecast.html) that plays all samples; it opens in any browser.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import check_method

@@ -32,8 +32,8 @@ def models(name: str | None = None, /, *, json: bool = False) -> None:
       interpose models cae
 
     Args:
-        name: of a model, whose whole card is printed: training data, licence, limits, measured
-            figures; or of a method without one.
+        name: a model or a method; of a model the whole card is printed: training data, licence,
+            limits, measured figures.
         json: print JSON for other programs.
     """
     from interpose.methods import registry, weights

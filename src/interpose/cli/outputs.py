@@ -261,7 +261,7 @@ def licence(completion: Completion) -> list[str]:
 
     closed = [one["name"] for one in used(completion) if not for_any_use(one["licence"])]
     named = " and ".join(closed)
-    return [f"{named}: for research and non-commercial use; --license open takes others"] if closed else []
+    return [f"{named}: for research and non-commercial use; --license open avoids them"] if closed else []
 
 
 def write(
@@ -328,13 +328,13 @@ def _legend(gaps: list[GapReport]) -> Iterator[str]:
     """What the columns mean, of those that are there."""
     if any(gap.seam_after is not None for gap in gaps):
         known = any(gap.seam_limit is not None and gap.seam_limit != gap.peak_limit for gap in gaps)
-        usual = ": what 95 of 100 of its own are below" if known else ""
+        usual = " (95th percentile of its own jumps)" if known else ""
         yield f"seam: velocity jump at the ends, cm/frame^2, of the joint nearest to its limit{usual}"
-    yield "bones: largest change of a length, cm"
+    yield "bones: largest change in bone length, cm"
     if any(gap.foot_slide is not None for gap in gaps):
-        yield "slide, travel: of the feet, cm/s and m"
+        yield "slide, travel: foot sliding, cm/s, and foot travel, m"
     if any(gap.drift is not None for gap in gaps):
-        yield "drift: of the way before it was evened out, cm"
+        yield "drift: of the trajectory before it was corrected, cm"
 
 
 def seam(jump: float | None, limit: float | None) -> str:

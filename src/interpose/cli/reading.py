@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @Parameter(
     name="*",
-    group=Group("What a file does not say (found or estimated, and printed, if not given)", sort_key=8),
+    group=Group("How to read the file (if not given: detected or estimated, and printed)", sort_key=8),
 )
 @dataclass(frozen=True)
 class Reading:
@@ -34,7 +34,7 @@ class Reading:
         Path | None, Parameter(help="The .asf file that an .amc file belongs to, if it is not beside it.")
     ] = None
     file_fps: Annotated[
-        float | None, Parameter(help="Frames a second of an .amc file, which does not say it; else 120.")
+        float | None, Parameter(help="Frame rate of an .amc file, which does not store it; default 120.")
     ] = None
     map: Annotated[
         Path | None,
@@ -45,7 +45,7 @@ class Reading:
         Parameter(help="Whether the file's axes are left- or right-handed."),
     ] = None
     root: Annotated[
-        str | None, Parameter(help="The topmost joint of the character meant, where a file has several.")
+        str | None, Parameter(help="The root joint of the character to use, if a file has several.")
     ] = None
 
     def load(self, path: Path, roles: Mapping[str, str] = MappingProxyType({})) -> Clip:

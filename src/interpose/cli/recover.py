@@ -36,12 +36,12 @@ def recover(
     force: bool = False,
     reading: Reading = Reading(),
 ) -> int:
-    """Recover joints that are missing in the whole clip or in a range, or that were lost for moments.
+    """Recover joints that are missing in the whole clip, in a range, or for moments.
 
-    Without --joints it finds what drops out: joints that snap to their rest
-    pose, or jump away and back within moments, and spikes, at any frames; arms
-    or legs that were taken for each other, or bend the other way; and hips that
-    stay where they are while they turn. What else is missing is listed, and `interpose fill` fills it.
+    Without --joints it finds and repairs dropouts (joints that snap to their rest
+    pose, spike, or jump away and back within moments), left and right limbs that were
+    swapped, knees and elbows that bend the wrong way, and hips that stay in place
+    while they turn. Other missing motion is listed; `interpose fill` fills it.
 
     Writes the clip and a report beside the input: take.recovered.bvh and
     take.recovered.json.
@@ -54,19 +54,19 @@ def recover(
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
-        more: further ones: each is done by itself.
-        joints: the joints, separated by commas; without any, those that drop out.
-        place: where the body is, is lost, and how it is turned is known, as of suits that know no places.
-            Feet that stand tell it. Without --frames it begins where the first frame is.
+        more: more clips or folders; each clip is processed by itself.
+        joints: the joints, separated by commas; default: those that drop out.
+        place: recover the root position where only rotations are known, as from inertial suits; it is found
+            from planted feet. Without --frames it starts from the first frame's position.
         frames: START:STOP, the frames START to STOP - 1, counted from 0; or seconds, 4s:5.3s. All without it.
-        output: where to write the clip; the report goes beside it. Of several clips a folder.
+        output: where to write the clip; the report goes beside it. With several clips: a folder.
         method: what recovers them: auto (the default), base, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        seed: for methods that sample.
+        seed: random seed, for methods that sample.
         player: write a page (take.recovered.html) that plays the result; it opens in any browser.
         dry_run: say what is found and done, and write nothing.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import check_method, range_of

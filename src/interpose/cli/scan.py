@@ -25,15 +25,15 @@ MOMENT = 0.5  # seconds before a jump, or after it, at an end of a clip that are
 def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> None:
     """Find what looks missing or wrong: frozen runs, stray rest poses, joints that drop out, swapped limbs.
 
-    Also limbs that are held with a tremble, joints that another program led straight or
-    splined, jumps, noise, and frames that are there twice. It says which verb mends what.
+    Also limbs that are frozen but jitter, joints that another program interpolated linearly or
+    by a spline, jumps, noise, and repeated frames. It names the command that repairs each.
 
     Try:
       interpose scan take.bvh
 
     Args:
         file: the clip (.bvh, .npz, .amc), or a folder of clips.
-        more: further ones: each is done by itself.
+        more: more clips or folders; each clip is processed by itself.
         json: print JSON for other programs.
     """
     from interpose.errors import few

@@ -36,7 +36,7 @@ def skeleton(
     force: bool = False,
     reading: Reading = Reading(),
 ) -> int:
-    """Print the tree of joints: which of the 22 that networks know each one is, and what just follows.
+    """Print the joint hierarchy, and which of the 22 joints that networks know each joint is.
 
     Try:
       interpose skeleton take.bvh
@@ -46,7 +46,7 @@ def skeleton(
 
     A saved map can be corrected by hand and given to any verb with --map.
 
-    Ends with 0 when the skeleton is a humanoid, 4 when networks cannot use it.
+    Exit code: 0 if the skeleton is a humanoid, 4 if networks cannot use it.
 
     Args:
         file: the clip (.bvh, .npz, .amc).

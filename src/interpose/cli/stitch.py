@@ -73,13 +73,13 @@ def stitch(
     force: bool = False,
     reading: Reading = Reading(),
 ) -> int:
-    """Lay clips one after another, and generate what leads from each to the next.
+    """Join clips one after another, and generate the transitions between them.
 
-    The first clip stays where it is, and its skeleton and frame rate are those of
-    the result; what is of another rig is retargeted. Each following clip is turned
-    and placed so that it goes on where the one before was heading; all of its
-    frames are kept. Heights above the floor stay as they are. Parts of one take with
-    up to .1 s between them go on as they did, also where the body's place jumps there.
+    The first clip stays where it is, and the result has its skeleton and frame rate;
+    clips on other rigs are retargeted. Each following clip is turned and placed so
+    that it continues in the direction of the one before; all of its frames are kept.
+    Heights above the floor stay the same. Parts of one take with up to .1 s between
+    them are joined as one continuous motion, even if the position jumps there.
     Writes the clip and a report beside the first file: walk.stitched.bvh and
     walk.stitched.json.
 
@@ -93,20 +93,20 @@ def stitch(
     Args:
         files: FILE or FILE#START:STOP, frames START to STOP - 1 of it, or seconds (.bvh, .npz, .amc); without
             START from the first frame on, without STOP to the last one.
-        frames: how many frames to generate, or seconds: one number, or one for each gap; auto chooses what is
-            unhurried.
-        align: turn and place each clip to go on from the one before; --no-align leaves clips where they lie.
-        loop: lead back to the beginning as well, so that the motion can be played round and round.
-        trim: with --loop, keep the part of the clip that goes round best already, such as one stride of a
-            walk, and generate a few frames alone.
-        action: what the generated motion is; `interpose models base` lists what there is.
+        frames: length of the transitions in frames, or seconds: one number, or one for each; auto (the
+            default) chooses unhurried ones.
+        align: turn and place each clip to continue the one before; --no-align leaves clips where they are.
+        loop: also generate a transition back to the beginning, so that the result can be played as a loop.
+        trim: with --loop, keep only the part of the clip that loops best, such as one stride of a walk, and
+            generate just a few frames to close it.
+        action: an action label for the generated motion; `interpose models base` lists them.
         output: where to write the clip; the report goes beside it.
         method: what generates it: auto (the default), base, spline, ... `interpose models` lists them.
         license: open to use only weights that may be used for anything; any (the default).
-        seed: for methods that sample.
+        seed: random seed, for methods that sample.
         player: write a page (walk.stitched.html) that plays the result; it opens in any browser.
         json: print the report as JSON.
-        force: replace existing files, of .json files only reports.
+        force: overwrite existing files (.json files only if they are reports).
     """
     from interpose import tasks
     from interpose.cli.request import check_method
@@ -182,7 +182,7 @@ def _part(file: Path, whole: Clip, part: str) -> Clip:
         raise RequestError(f"cannot read the part {part} of {file}", "a part is START:STOP", fix) from None
     if not 0 <= span.start < span.stop <= len(whole):
         why = f"the clip has {len(whole)} frames, counted from 0"
-        raise RequestError(f"there are no frames {part} in {file}", why, f"Choose some of 0:{len(whole)}.")
+        raise RequestError(f"there are no frames {part} in {file}", why, f"Stay within 0:{len(whole)}.")
     return whole.slice(span.start, span.stop)
 
 

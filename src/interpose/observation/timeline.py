@@ -162,9 +162,9 @@ def lay(
     """
     clips = list(clips)
     if not clips or (len(clips) == 1 and not loop):
-        fix = "Name two clips or more, or let one go round: --loop (loop=True)."
+        fix = "Name two clips or more, or make a loop of one with --loop (loop=True)."
         raise RequestError(
-            "there is nothing to stitch", f"it takes two clips, and {len(clips)} is there", fix
+            "there is nothing to stitch", f"it needs two clips or more, and got {len(clips)}", fix
         )
     for clip in clips:
         if not len(clip):

@@ -54,8 +54,8 @@ def between(
     if not gaps:
         raise RequestError(
             "there is nothing between the keys",
-            f"the keys are {', '.join(map(str, chosen)) or 'none'}",
-            "Name some that are apart: 0, 30, 75. Poses that follow each other: between --start, --target.",
+            f"the keys are {', '.join(map(str, chosen))}" if chosen else "no keys are given",
+            "Give keys with frames between them: --keys 0,30,75. For poses of two files: --start, --target.",
         )
     zero, stop = (chosen[0], chosen[-1] + 1) if cut else (0, len(clip))
     done = fill(
