@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from dataclasses import replace
@@ -44,6 +45,7 @@ def test_the_report_says_what_was_done(run, take):
     assert done.json == written
     assert written["input"] == "take.bvh"
     assert written["output"] == "take.filled.bvh"
+    assert written["input_sha256"] == hashlib.sha256(take.read_bytes()).hexdigest()
     assert written["unit"] == pytest.approx(0.0254 / 0.45)
     (gap,) = written["gaps"]
     assert gap["number"] == 1

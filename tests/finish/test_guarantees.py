@@ -85,6 +85,14 @@ def test_observed_values_and_bones_are_the_same(walk, make, case):
     assert np.allclose(np.linalg.norm(done.clip.rotation, axis=-1), 1, atol=1e-9)
     missing = ~(known.rotation & known.translation)
     assert ((done.provenance != Provenance.OBSERVED) == missing).all()
+    told = np.zeros_like(done.provenance)
+    for one in done.sources():
+        start, stop = map(int, one["frames"].split(":"))
+        joints = range(len(walk.skeleton))
+        if one["joints"] is not None:
+            joints = [walk.skeleton.index(name) for name in one["joints"]]
+        told[start:stop, joints] = Provenance[one["source"].upper()]
+    assert (told == done.provenance).all()
 
 
 class File:

@@ -185,13 +185,23 @@ def fill(
 
 
 def _retold(done: Completion, told: dict[str, list[str]]) -> Completion:
-    """A completion whose gaps are told of, by their frames, what is told."""
+    """A completion whose gaps are told of, by their frames, what is told; what stood in for a method does so
+    once more."""
+    from interpose.finish import Provenance
+
+    codes, names = done.provenance.copy(), done.clip.skeleton.names
+    for gap in done.report.gaps:
+        if any(note.startswith("filled by ") for note in told.get(f"{gap.start}:{gap.stop}", ())):
+            for name in names if gap.joints is None else gap.joints:
+                part = codes[gap.start : gap.stop, names.index(name)]
+                part[part != Provenance.OBSERVED] = Provenance.FALLBACK
 
     def with_told(gap: GapReport) -> GapReport:
         more = [note for note in told.get(f"{gap.start}:{gap.stop}", ()) if note not in gap.notes]
         return replace(gap, notes=(*more, *gap.notes))
 
-    return replace(done, report=replace(done.report, gaps=list(map(with_told, done.report.gaps))))
+    report = replace(done.report, gaps=list(map(with_told, done.report.gaps)))
+    return replace(done, provenance=codes, report=report)
 
 
 def _why(gap: Gap, max_gap: int | None) -> str:

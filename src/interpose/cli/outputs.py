@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
+from hashlib import sha256
 from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +42,7 @@ UNITS = {
     "pins": "cm",
     "drift": "cm",
     "expected": "cm",
+    "expected_most": "cm",
 }
 
 
@@ -179,6 +181,7 @@ def to_json(
         "interpose": __version__,
         "verb": verb,
         "input": str(file),
+        "input_sha256": sha256(file.read_bytes()).hexdigest(),
         "output": str(output),
         **details(clip),
         "method": report["method"],
@@ -197,6 +200,7 @@ def to_json(
         ],
         **{name: report[name] for name in ("moments", "exchanged", "unpaired") if name in report},
         "weights": used(completion),
+        "sources": completion.sources(),
         "units": UNITS,
     }
 

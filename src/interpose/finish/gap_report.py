@@ -69,6 +69,7 @@ def gap_report(
         gliding=glide[0] if glide else None,
         drift=_centi(_drift(raw.notes, gap)) if own else None,
         expected=_centi(float(np.mean(risk))) if risk is not None else None,
+        expected_most=_centi(float(np.max(risk))) if risk is not None else None,
         notes=(
             *span.told(gap),
             *((inside[1],) if inside and inside[1] else ()),

@@ -13,6 +13,7 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import few
+from interpose.geometry.time import runs
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap
 
@@ -58,8 +59,8 @@ class GapReport:
         path: cm, by how much the hips miss points of the path that was asked for.
         pins: cm, by how much pinned joints miss their places.
         drift: cm, of the root trajectory before it was spread over the gap.
-        expected: cm that joints which are not known are expected to be off by, in the mean; of networks that
-            say so.
+        expected, expected_most: cm that joints which are not known are expected to be off by, in the mean of
+            them and of the frames, and in that of the worst frame; of networks that say so.
         notes: one sentence each: what fell back and why, what stays above a limit.
         number: of the gap in its clip, counted from 1 in order of time; 0 where nobody counted.
     """
@@ -87,6 +88,7 @@ class GapReport:
     pins: float | None = None
     drift: float | None = None
     expected: float | None = None
+    expected_most: float | None = None
     notes: tuple[str, ...] = ()
     number: int = 0
 
@@ -269,6 +271,24 @@ class Completion:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.clip!r}>\n{self.report}"
+
+    def sources(self) -> list[dict[str, Any]]:
+        """Where the values come from that are not as they were observed: entries of `frames` "START:STOP",
+        `joints` (None for all), and `source`, a name of `Provenance` in small letters; in order of time."""
+        found: dict[tuple[int, int, int], list[str]] = {}
+        for name, codes in zip(self.clip.skeleton.names, self.provenance.T):
+            for code in np.unique(codes[codes != Provenance.OBSERVED]).tolist():
+                for start, stop in runs(codes == code):
+                    found.setdefault((start, stop, code), []).append(name)
+        every = len(self.clip.skeleton)
+        return [
+            {
+                "frames": f"{start}:{stop}",
+                "joints": names if len(names) < every else None,
+                "source": Provenance(code).name.lower(),
+            }
+            for (start, stop, code), names in sorted(found.items())
+        ]
 
     @cached_property
     def raw(self) -> Raw:
