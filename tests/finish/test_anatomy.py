@@ -12,7 +12,7 @@ from interpose.geometry import rotations
 from interpose.methods.classical import Linear, Spline
 from interpose.methods.protocol import Raw
 from interpose.observation import Gap, Observation
-from interpose.skeletons import find_humanoid
+from interpose.skeletons import JOINTS, find_humanoid
 from interpose.skeletons.humanoid import reflect
 
 GAP = Gap(70, 110)
@@ -76,6 +76,22 @@ def test_knees_do_not_bend_forwards(cmu_walk, make):
     assert bend(raw) < -20
     assert bend(done.clip) > -5
     assert done.report.gaps[0].method == "turning"
+
+
+def test_a_knee_that_bends_backwards_is_said_to(cmu_walk):
+    gap, shin = Gap(60, 90), cmu_walk.skeleton.index("LeftLeg")
+    known = Observation.from_gaps(cmu_walk, [gap])
+    assert anatomy.bent_back(cmu_walk, known, gap, 0) == []
+    for back, said in ((4.0, []), (12.0, ["flagged: LeftLeg bends backwards by 12 degrees at frame 175"])):
+        body = find_humanoid(cmu_walk)
+        turned = body.rotations(cmu_walk)
+        thigh, leg = (JOINTS.index(name) for name in ("LeftUpLeg", "LeftLeg"))
+        turned[75, leg] = rotations.multiply(turned[75, thigh], rotations.about("X", np.radians(-back)))
+        rotation = cmu_walk.rotation.copy()
+        done = body.to_clip(turned, body.root(cmu_walk), cmu_walk)
+        rotation[75, shin] = done.rotation[75, shin]
+        bent = cmu_walk.with_motion(rotation, cmu_walk.translation)
+        assert anatomy.bent_back(bent, known, gap, 100) == said
 
 
 def test_a_joint_that_whirls_goes_the_short_way(cmu_walk):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.finish import feet, hanging, jumps, notes, penetration
+from interpose.finish import anatomy, feet, hanging, jumps, notes, penetration
 from interpose.finish.report import GapReport, Provenance
 from interpose.finish.span import Span
 from interpose.geometry import measures, rotations
@@ -82,6 +82,7 @@ def gap_report(
             *notes.skids(held[0] if held else None, finished, known, gap, first),
             *notes.hasty(finished, known, gap, first),
             *notes.whirling(finished, known, gap, first),
+            *anatomy.bent_back(finished, known, gap, first),
             *([] if bounds else notes.wild(finished, known, gap, first)),
             *notes.doubtful(risk, finished, gap, first),
             *(notes.scant(known, gap, finished.fps) if networks else ()),
