@@ -229,7 +229,8 @@ def test_what_is_refused(cmu_walk, arguments, what):
 
 @pytest.mark.parametrize("start", [30, 45])
 def test_a_foot_on_its_way_at_an_end_of_the_clip_stays_there(cmu_walk, start):
-    """What is around an end lies on one side of it: that a foot is far from it says nothing."""
+    """What is around an end lies on one side of it: that a foot is far from it says nothing. It is as far off
+    as in its middle: 8.1 cm, with 2 degrees on every turn."""
     clip = cmu_walk.slice(start, start + 80)
     noisy = tremble(clip, 2.0, np.random.default_rng(0))
     ends = feet.ends(clip.skeleton)

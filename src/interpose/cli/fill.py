@@ -16,7 +16,7 @@ from interpose.cli.whole import WHOLE, Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
-    from interpose.cli.request import Request
+    from interpose.cli.request import At, Request
     from interpose.clip import Clip
     from interpose.finish import Completion, GapReport
     from interpose.observation import Gap, Pin
@@ -184,24 +184,28 @@ def fill(
     return code or (4 if request.left else 0)
 
 
-def _retold(done: Completion, told: dict[str, list[str]]) -> Completion:
-    """A completion whose gaps are told of, by their frames, what is told; what stood in for a method does so
-    once more."""
+def _retold(done: Completion, told: dict[At, list[str]]) -> Completion:
+    """A completion whose gaps are told of, by frames and joints, what is told; what stood in for a method
+    does so once more."""
     from interpose.finish import Provenance
 
     codes, names = done.provenance.copy(), done.clip.skeleton.names
     for gap in done.report.gaps:
-        if any(note.startswith("filled by ") for note in told.get(f"{gap.start}:{gap.stop}", ())):
+        if any(note.startswith("filled by ") for note in told.get(_at(gap), ())):
             for name in names if gap.joints is None else gap.joints:
                 part = codes[gap.start : gap.stop, names.index(name)]
                 part[part != Provenance.OBSERVED] = Provenance.FALLBACK
 
     def with_told(gap: GapReport) -> GapReport:
-        more = [note for note in told.get(f"{gap.start}:{gap.stop}", ()) if note not in gap.notes]
+        more = [note for note in told.get(_at(gap), ()) if note not in gap.notes]
         return replace(gap, notes=(*more, *gap.notes))
 
     report = replace(done.report, gaps=list(map(with_told, done.report.gaps)))
     return replace(done, provenance=codes, report=report)
+
+
+def _at(gap: GapReport) -> At:
+    return f"{gap.start}:{gap.stop}", gap.joints
 
 
 def _why(gap: Gap, max_gap: int | None) -> str:

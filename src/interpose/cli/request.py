@@ -32,6 +32,7 @@ LEFT = {
 }
 # Notes that tell why another method filled a gap.
 STOOD_IN = re.compile(r"not filled by |filled by .* instead")
+At = tuple[str, tuple[str, ...] | None]  # where a gap is: its frames, and its joints
 OTHERS = ("denoise", "forecast", "stitch")  # verbs whose reports `fill` cannot repeat
 
 
@@ -69,7 +70,7 @@ class Request:
         left: what is missing, too, and is another verb's.
         dropped: the same of joints that drop out for moments, which most takes have: no reason to look again.
         layer: whether the parts are laid over motion that stays.
-        told: of gaps by their frames why another method filled them than the one that was asked for.
+        told: of gaps, by frames and joints, why another method filled them than the one that was asked for.
     """
 
     gaps: list[Gap]
@@ -86,7 +87,7 @@ class Request:
     left: str = ""
     dropped: str = ""
     layer: bool = False
-    told: dict[str, list[str]] = field(default_factory=dict)
+    told: dict[At, list[str]] = field(default_factory=dict)
 
 
 def from_options(
@@ -382,12 +383,13 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         Gap.parse(one["frames"], None if one["joints"] is None else tuple(one["joints"])) for one in left
     ]
     methods: dict[int, set[str]] = {}
-    told: dict[str, list[str]] = {}
+    told: dict[At, list[str]] = {}
     for entry in content["gaps"]:
         methods.setdefault(entry["number"], set()).add(_text(entry["method"]))
         # What filled it is not asked why, so that what another method stood in for is said once more.
         if stood := [note for note in entry.get("notes", []) if STOOD_IN.match(_text(note))]:
-            told[_text(entry["frames"])] = stood
+            joints = entry["joints"]
+            told[_text(entry["frames"]), None if joints is None else tuple(joints)] = stood
     parts = [
         part
         for one in content.get("parts", [])

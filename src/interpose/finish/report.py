@@ -23,7 +23,7 @@ class Provenance(IntEnum):
 
     OBSERVED = 0  # of this clip, or of another one that parts come from
     METHOD = 1  # what the method said (solved, where it speaks positions)
-    CORRECTED = 2  # the method's, changed by seams or feet
+    CORRECTED = 2  # the method's, changed by seams or feet; or observed, and put on its side
     FALLBACK = 3  # the simpler method's
     SMOOTHED = 4  # observed, and changed by `denoise`
     OPEN = 5  # nowhere: the gap was left open

@@ -167,7 +167,7 @@ def _format(path: Path) -> Format:
     except KeyError:
         raise RequestError(
             f"unknown file format: {path.name}",
-            f"its suffix is {path.suffix}" if path.suffix else "it has no suffix, and is no existing folder",
+            f"its suffix is {path.suffix}" if path.suffix else "it has no suffix",
             f"Supported are {', '.join(FORMATS)}.",
         ) from None
 

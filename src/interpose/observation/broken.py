@@ -111,7 +111,7 @@ def _smoother(clip: Clip, seen: Observation, sure: np.ndarray) -> Observation:
     """
     columns = list(clip.translated)
     lost = ~(seen.rotation & seen.translation)
-    if not lost.any():
+    if not lost.any() or len(clip) < 3:
         return seen
     rotation, translation = clip.rotation.copy(), clip.translation.copy()
     frames = np.arange(len(clip))
