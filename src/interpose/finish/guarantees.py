@@ -288,7 +288,9 @@ class _Work:
                 span.notes.append((start, stop - 1, f"a spline leads over {which}, where velocities jumped"))
             if steps := self.stepped.get(chosen):
                 span.notes.append((span.start, span.stop - 1, steps))
-            for excess, above, where in jumps.excesses(current, known, span, self.bounds, ask.first):
+            asked = (current, known, span, self.bounds, ask.first)
+            found = [one for one in jumps.excesses(*asked) if one[0] > jumps.SLACK]
+            for excess, above, where in found or jumps.whips(*asked):
                 if excess > jumps.SLACK:
                     span.notes.append((where, where, f"flagged: {above}"))
         columns = list(clip.translated)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -39,7 +37,6 @@ TELLS = 1.0
 SLACK = 1.02
 # Seconds.
 BEAT = 1 / 30
-Measure = Callable[[Clip, Observation, np.ndarray], np.ndarray]  # of some frames, see `seams.jumps`
 # The change of velocity (metres a second) beyond which none is softened: that is a jump in value.
 KINK = 8.0
 
@@ -174,26 +171,45 @@ def excesses(
     names = current.skeleton.names
     bounds = bounds or Bounds.untold(current.skeleton, current.fps)
     found = []
-
-    def look(frames: np.ndarray, most: np.ndarray, where: str, jumps: Measure, step: int = 1) -> None:
-        if not frames.size:
-            return
-        # Told by the frame, over however many.
-        size = np.linalg.norm(jumps(current, known, frames), axis=-1) / step**2
-        most = np.broadcast_to(most, size.shape)
-        row, joint = np.unravel_index((size / most).argmax(), size.shape)
-        own, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
-        words = f"the velocity jumps by {100 * own:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
-        found.append((own / limit, f"{words} ({names[joint]}, frame {first + frame})", frame))
-
     edges = seams.edges(known, current.translated, (span.start, span.stop))
-    look(edges, bounds.at(current, known, edges), "at a seam", seams.seam_jumps)
-    frames = np.arange(span.start, span.stop)
-    look(_inner(current, frames), bounds.peak, "inside the gap", seams.jumps)
-    if (step := beats(current.fps)) > 1 and (not found or found[-1][0] <= 1):
-        most, where = np.array(bounds.beat / step**2), f"inside the gap, over {step} frames"
-        look(_inner(current, frames, step), most, where, partial(seams.jumps, step=step), step)
+    inner = _inner(current, np.arange(span.start, span.stop))
+    for frames, measure, most, where in (
+        (edges, seams.seam_jumps, bounds.at(current, known, edges), "at a seam"),
+        (inner, seams.jumps, bounds.peak, "inside the gap"),
+    ):
+        if frames.size:
+            size = np.linalg.norm(measure(current, known, frames), axis=-1)
+            found.append(_worst(size, most, frames, names, where, first))
     return found
+
+
+def whips(
+    current: Clip, known: Observation, span: Span, bounds: Bounds | None, first: int
+) -> list[tuple[float, str, int]]:
+    """As `excesses`, of jumps inside of a span over the frames of a BEAT, where it has more than one. What
+    whips so is still nearer to the motion than a simpler method's, and no reason for that one to take over.
+    """
+    step = beats(current.fps)
+    frames = _inner(current, np.arange(span.start, span.stop), step)
+    if step == 1 or not frames.size:
+        return []
+    bounds = bounds or Bounds.untold(current.skeleton, current.fps)
+    # Told by the frame, as all jumps are.
+    size = np.linalg.norm(seams.jumps(current, known, frames, step), axis=-1) / step**2
+    where = f"inside the gap, over {step} frames"
+    most = np.array(bounds.beat / step**2)
+    return [_worst(size, most, frames, current.skeleton.names, where, first)]
+
+
+def _worst(
+    size: np.ndarray, most: np.ndarray, frames: np.ndarray, names: tuple[str, ...], where: str, first: int
+) -> tuple[float, str, int]:
+    """An entry of `excesses`: of jumps (n, J) at some frames the one furthest beyond what it may be."""
+    most = np.broadcast_to(most, size.shape)
+    row, joint = np.unravel_index((size / most).argmax(), size.shape)
+    own, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
+    words = f"the velocity jumps by {100 * own:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
+    return own / limit, f"{words} ({names[joint]}, frame {first + frame})", frame
 
 
 def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> list[tuple[int, int]]:
