@@ -196,7 +196,7 @@ def test_so_is_one_that_says_rotations(walk):
     turned = rotations.angle(done.clip.rotation, walk.rotation)[:, walk.skeleton.index("LeftArm")]
     off = np.linalg.norm(done.clip.root - walk.root, axis=-1)
     for away, most in ((turned, 0.2), (off, 0.1)):
-        assert away[[30, 89]].max() < 0.02 * most
+        assert away[[30, 89]].max() < 0.03 * most
         assert np.diff(away[30:60]).max() < 0.08 * most
         assert away[60] == pytest.approx(most, rel=0.05)
 

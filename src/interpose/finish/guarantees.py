@@ -25,6 +25,7 @@ from interpose.finish import (
     shuffling,
     stepping,
 )
+from interpose.finish.axes import Axes
 from interpose.finish.calming import calmed
 from interpose.finish.gap_report import gap_report, provenance, slides
 from interpose.finish.loose import Layer
@@ -32,7 +33,7 @@ from interpose.finish.opinion import as_rotations, carried, certain, merge, refu
 from interpose.finish.report import Completion, Report
 from interpose.finish.span import Span, write
 from interpose.finish.standing import alone
-from interpose.formats import axes, held
+from interpose.formats import held
 from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method, Raw
@@ -113,7 +114,7 @@ class _Work:
         bounds: how far velocities may jump; None where nothing is known to compare with.
         before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
-        still: (J,) joints that never turn.
+        axes: of joints that turn about fewer than three; `still` (J,) those that never turn.
         simpler: what the simpler method said, where it was asked.
         mended, stepped: the frames of spans over which a spline leads, and what is to be said of spans that
             were given steps, by their first frames and whether in the method's own motion.
@@ -127,6 +128,8 @@ class _Work:
         self.gaps = self.known.gaps(clip.skeleton)
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
         self.still = anatomy.still(hidden, self.known) if ask.still is None else ask.still
+        # Pins ask for what a body does not do by itself, and their files hold it.
+        self.axes = Axes.said(clip.source) if self.layer else Axes.of(hidden, self.known, clip.source)
         self.simpler: Raw | None = None
         self.unheld: dict[Gap, tuple[float, float]] = {}
         self.mended: dict[tuple[int, bool], list[tuple[int, int]]] = {}
@@ -190,6 +193,7 @@ class _Work:
         current, layer, own = self.current, self.layer, source is self.opinion
         for span in chosen:
             _fade(current, source, self.hidden, self.firm, span)
+            self._holdable(current, span)
             if not (layer and layer.pins):
                 # What is pinned would be put back there, and jump.
                 anatomy.unwhirl(current, self.firm, span)
@@ -217,23 +221,20 @@ class _Work:
             for i, span in enumerate(chosen):
                 if i not in waiting | beside or _stalls(told[i]):
                     continue
-                if excess := jumps.soften(current, self.firm, span, self.bounds, self._axes):
+                if excess := jumps.soften(current, self.firm, span, self.bounds, self.axes):
                     told[i].append(excess)
                     self._holdable(current, span)
                     beside |= {i - 1, i, i + 1}
             waiting = beside
 
-    def _axes(self, motion: Clip) -> dict[int, np.ndarray]:
-        return axes(motion, self.clip.source)
-
     def _holdable(self, current: Clip, span: Span) -> None:
-        """Let joints in a span turn about the axes that their file has."""
+        """Let joints in a span turn about the axes that they have."""
         lo, hi, inner = span.around(len(current), 0)
         write(current, self._held(current.slice(lo, hi), self.known.slice(lo, hi)), lo, inner)
 
     def _held(self, motion: Clip, known: Observation) -> Clip:
-        """What the file can hold of some motion, but for what of it is known."""
-        done = held(motion, self.clip.source)
+        """Some motion by joints that turn about the axes that they have, but for what of it is known."""
+        done = self.axes.held(motion, known)
         return motion if done is motion else merge(done, motion, known)
 
     def fall_back(self) -> None:
@@ -331,7 +332,7 @@ class _Work:
         three, and what these leave over others make up for, round by round."""
         best, least = current, np.inf
         for _ in range(ROUNDS):
-            met = pins.meet(current, self.known, pinned, axes=self._axes)
+            met = pins.meet(current, self.known, pinned, axes=self.axes)
             current = self._held(met, self.known)
             if current is met:
                 return met
