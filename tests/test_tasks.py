@@ -31,6 +31,7 @@ from interpose.observation.scan import intact, scan
 from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
 from interpose.skeletons.body import facing
+from interpose.skeletons.performers import clip_of
 from interpose.tasks import filling, stitching, windows
 from interpose.tasks.blocking import blocked
 
@@ -1030,3 +1031,72 @@ def test_two_gaps_of_one_body_within_one_of_another_stay_two(duo, cmu_walk):
         (100, 110),
     ]
     assert np.array_equal(done.clip.rotation[70:100, count:], duo.rotation[70:100, count:])
+
+
+def test_each_of_two_bodies_is_denoised_as_if_it_were_alone(duo, cmu_walk):
+    """Its root, too, and a limb of it that changed sides is put back."""
+    count = len(cmu_walk.skeleton)
+    rng = np.random.default_rng(3)
+    shaken = duo.translation + rng.normal(0.0, 0.015, duo.translation.shape)
+    rotation = duo.rotation.copy()
+    legs = ["LeftUpLeg", "LeftLeg", "LeftFoot", "RightUpLeg", "RightLeg", "RightFoot"]
+    legs = [duo.skeleton.index(f"B_{name}") for name in legs]
+    rotation[100:140, legs] = rotation[100:140][:, legs[3:] + legs[:3]]
+    noisy = duo.with_motion(rotation, shaken)
+    done = tasks.denoise(noisy)
+    alone = tasks.denoise(clip_of(noisy, tuple(range(count, 2 * count))))
+    np.testing.assert_array_equal(done.clip.rotation[:, count:], alone.clip.rotation)
+    np.testing.assert_array_equal(done.clip.translation[:, 1:], alone.clip.translation)
+    off = np.linalg.norm(done.clip.translation - duo.translation, axis=-1).mean(axis=0)
+    assert (off < 0.5 * np.linalg.norm(shaken - duo.translation, axis=-1).mean(axis=0)).all(), off
+    assert {one.joint for one in done.report.exchanged} >= {duo.skeleton.names[joint] for joint in legs}
+    assert [one.joint for one in done.report.noise.joints] == list(duo.skeleton.names)
+    assert done.report.noise.values == 2 * alone.report.noise.values
+
+    one = tasks.denoise(noisy, joints=["LeftArm"]).clip
+    assert np.array_equal(one.rotation[:, count:], noisy.rotation[:, count:])
+    assert not np.array_equal(one.rotation[:, :count], noisy.rotation[:, :count])
+
+
+def test_how_one_body_moves_does_not_say_how_another_one_may(duo, cmu_walk):
+    """Beside somebody who whirls, the seams of one who walks are what they are alone, and so is its gap."""
+    count = len(cmu_walk.skeleton)
+    rotation = duo.rotation.copy()
+    turn = rotations.about("Y", np.linspace(0.0, 40.0, len(duo)))
+    for name in ("B_LeftArm", "B_RightArm", "B_Hips", "B_LeftUpLeg"):
+        joint = duo.skeleton.index(name)
+        rotation[:, joint] = rotations.multiply(turn, rotation[:, joint])
+    wild, own = duo.with_motion(rotation, duo.translation), duo.skeleton.names[:count]
+    (gap,) = tasks.fill(wild, [Gap(60, 90, own)], "spline").report.gaps
+    (alone,) = tasks.fill(cmu_walk, [Gap(60, 90)], "spline").report.gaps
+    assert gap.seam_limit == pytest.approx(alone.seam_limit)
+
+
+def test_a_body_that_is_lost_for_a_moment_beside_another_is_a_gap(duo, cmu_walk):
+    """And no values of single joints, as something is known of the other one."""
+    count = len(cmu_walk.skeleton)
+    seen = Observation.full(duo)
+    seen.rotation[60:66, :count] = seen.translation[60:66, :count] = False
+    done = tasks.fill(duo, seen)
+    assert [(gap.start, gap.stop) for gap in done.report.gaps] == [(60, 66)]
+    assert not done.report.moments
+
+
+def test_what_is_lost_for_moments_stays_open_where_it_lasts_longer_than_allowed(cmu_walk):
+    arm, seen = cmu_walk.skeleton.index("LeftForeArm"), Observation.full(cmu_walk)
+    seen.rotation[60:68, arm] = False
+    assert [len(gap) for gap in tasks.fill(cmu_walk, seen, max_gap=3).report.open] == [8]
+    assert not tasks.fill(cmu_walk, seen, max_gap=8).report.open
+
+
+def test_a_forecast_does_not_start_from_a_rest_pose_that_ends_a_file(cmu_walk):
+    """It is made anew, as all that follows, and that is said."""
+    rotation = cmu_walk.rotation.copy()
+    rotation[-1] = cmu_walk.skeleton.rest_rotation
+    ended = cmu_walk.with_motion(rotation, cmu_walk.translation)
+    last = len(cmu_walk) - 1
+    done = tasks.forecast(ended, 30)
+    whole = tasks.forecast(cmu_walk.slice(0, last), 31)
+    np.testing.assert_allclose(done.clip.positions(), whole.clip.positions(), atol=1e-6)
+    assert (done.start, len(done.clip)) == (last, last + 31)
+    assert any(f"frame {last} is no part of the motion" in note for note in done.report.gaps[0].notes)

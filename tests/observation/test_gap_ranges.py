@@ -10,7 +10,13 @@ from interpose.observation import Gap
 
 @pytest.mark.parametrize(
     ("text", "expected"),
-    [("12:40", (12, 40)), ("1s:1.5s", (30, 45)), ("100:", (100, 209)), (":1s", (0, 30)), (" 5:2s ", (5, 60))],
+    [
+        ("12:40", (12, 40)),
+        ("1s:1.5s", (30, 45)),
+        ("100:", (100, 209)),
+        (":1s", (0, 30)),
+        (" 1s : 2s ", (30, 60)),
+    ],
 )
 def test_of_a_clip(cmu_walk, text, expected):
     assert len(cmu_walk) == 209

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from enum import IntEnum
 from functools import cached_property, partial
 from typing import Any
@@ -162,6 +162,29 @@ class NoiseReport:
     joints: tuple[JointNoise, ...] = field(repr=False)
     noisy: tuple[str, ...] = ()
     frozen: tuple[str, ...] = ()
+
+    @classmethod
+    def of_bodies(cls, told: Sequence[NoiseReport]) -> NoiseReport:
+        """What is to be said of several bodies at once: means are those of all of their joints."""
+        joints = tuple(joint for one in told for joint in one.joints)
+        share = [len(one.joints) / len(joints) for one in told]
+        means: dict[str, Any] = {
+            name: float(np.dot(share, [getattr(one, name) for one in told]))
+            for name in ("noise", "moved", "turned")
+        }
+        most: dict[str, Any] = {
+            name: max(getattr(one, name) for one in told) for name in ("moved_most", "turned_most")
+        }
+        return replace(
+            told[0],
+            **means,
+            **most,
+            broken=sum(one.broken for one in told),
+            values=sum(one.values for one in told),
+            joints=joints,
+            noisy=tuple(dict.fromkeys(frames for one in told for frames in one.noisy)),
+            frozen=tuple(said for one in told for said in one.frozen),
+        )
 
     def __str__(self) -> str:
         shakiest = max(self.joints, key=lambda one: one.noise)

@@ -64,7 +64,7 @@ class Gap:
         """
         if not isinstance(text, str):
             raise unfit("gap", text, 'a text, such as "120:160"')
-        first, colon, last = text.strip().partition(":")
+        first, colon, last = (part.strip() for part in text.partition(":"))
 
         if not isinstance(clip, Clip | None):
             raise unfit("clip", clip, "a clip: interpose.load reads one")

@@ -10,7 +10,9 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError, few, is_number
 from interpose.finish import Completion, Provenance
+from interpose.finish.completing import assembled
 from interpose.finish.denoise import denoised, measured
+from interpose.finish.report import NoiseReport
 from interpose.methods import registry
 from interpose.methods.classical import Spline
 from interpose.methods.protocol import Method
@@ -19,10 +21,12 @@ from interpose.observation.exchange import put_back
 from interpose.observation.finding import STUCK, Finding
 from interpose.observation.frozen import held_values
 from interpose.observation.scan import intact, scan
+from interpose.skeletons.performers import Joints, clip_of, meant
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import seed_of
 from interpose.tasks.recovering import swaps, with_sides
 
+ALL = "all"
 STRONGEST = 100.0  # how many times the estimated noise may be assumed
 
 
@@ -34,7 +38,8 @@ def denoise(
     method: str | Method = "auto",
     seed: int | None = None,
 ) -> Completion:
-    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1.
+    """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1; of
+    several bodies each as if it were alone.
 
     Args:
         clip: what is observed but not fully trusted.
@@ -59,6 +64,14 @@ def denoise(
     if frames is not None:
         Gap(start, stop).check(len(clip))
     chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
+    if several := meant(clip.skeleton):
+        bodies: dict[Joints, Completion] = {}
+        for body in several:
+            own = clip_of(clip, body)
+            some = None if joints is None else [name for name in joints if name in own.skeleton.names]
+            if some != []:
+                bodies[body] = denoise(own, strength, some, frames, method, seed)
+        return _of_bodies(clip, bodies)
     swapped = swaps(clip, start, stop) if chosen is None and strength else []
     sides = put_back(clip, swapped)
     frozen = _frozen(sides, start, stop) if strength else []
@@ -73,6 +86,20 @@ def denoise(
     done = with_sides(_with_frozen(done, sides, frozen), swapped)
     assert done.report.noise is not None
     return replace(done, report=replace(done.report, noise=measured(done.report.noise, clip, done.clip)))
+
+
+def _of_bodies(clip: Clip, bodies: dict[Joints, Completion]) -> Completion:
+    """A clip with bodies that were denoised one by one, and what is to be said of all of them."""
+    done, told = assembled(clip, bodies), []
+    for one in bodies.values():
+        assert one.report.noise is not None
+        # All joints are those of this body.
+        frozen = tuple(
+            said.replace(f"({ALL})", f"({few(list(one.clip.skeleton.names))})")
+            for said in one.report.noise.frozen
+        )
+        told.append(replace(one.report.noise, frozen=frozen))
+    return replace(done, report=replace(done.report, noise=NoiseReport.of_bodies(told)))
 
 
 def _frozen(clip: Clip, start: int, stop: int) -> list[Finding]:
@@ -104,7 +131,7 @@ def _led_over(clip: Clip, frozen: Sequence[Finding]) -> Clip:
 
 
 def _told(one: Finding) -> str:
-    joints = few(list(one.joints)) if one.joints else "all"
+    joints = few(list(one.joints)) if one.joints else ALL
     by = "recover restores" if one.kind in STUCK else "fill fills"
     return f"{one.start}:{one.stop} ({joints}), which interpose {by}"
 

@@ -20,6 +20,7 @@ from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
 from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
+from interpose.skeletons.performers import clip_of, performers
 from interpose.skeletons.targets import following, seated
 from interpose.tasks.moments import mended, momentary, with_moments
 from interpose.tasks.planning import Job, plan, seed_of
@@ -83,7 +84,7 @@ def fill(
     piecemeal = isinstance(gaps, Observation) and not observation.pins and method in ("auto", "spline")
     # Numbers count what was observed.
     piecemeal = piecemeal and only is None and not methods
-    brief = momentary(clip, observation) if piecemeal else None
+    brief = momentary(clip, observation, max_gap) if piecemeal else None
     if brief:
         clip, observation = mended(clip, observation, brief)
     if not len(clip):
@@ -101,8 +102,7 @@ def fill(
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature, zero)
     _check_open(jobs, points)
     # Of all of the take: a window of it tells less of how it moves.
-    limits = seams.limits(clip, observation) if any(job.method for job in jobs) else None
-    still = anatomy.still(clip, observation)
+    limits, still = _habits(clip, observation) if any(job.method for job in jobs) else (None, None)
     work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
     for done, (group, chosen) in enumerate(work):
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
@@ -124,6 +124,22 @@ def fill(
             going[gap.start : gap.stop] = False
         return _with_targets(filled, observation, going)
     return with_moments(filled, clip, brief) if brief else filled
+
+
+def _habits(clip: Clip, observation: Observation) -> tuple[np.ndarray | None, np.ndarray]:
+    """How far velocities of joints jump at seams, and which never turn, as `complete` takes them: of several
+    bodies by what is known of each."""
+    limits, still = seams.limits(clip, observation), anatomy.still(clip, observation)
+    for joints in performers(clip.skeleton):
+        own = list(joints)
+        body = (
+            clip_of(clip, joints),
+            Observation(observation.rotation[:, own], observation.translation[:, own]),
+        )
+        still[own] = anatomy.still(*body)
+        if limits is not None and (most := seams.limits(*body)) is not None:
+            limits[own] = most
+    return limits, still
 
 
 def _known(observation: Observation) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from interpose.finish.opinion import refusal
 from interpose.methods import registry
 from interpose.methods.protocol import Method, Sampler
 from interpose.observation import Gap, Observation, timeline
+from interpose.observation.scan import strays
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import plan, seed_of
 
@@ -53,7 +54,8 @@ def forecast(
     """Go on with a clip, from its last pose and where that is.
 
     Args:
-        clip: what is known; it comes back unchanged.
+        clip: what is known; it comes back unchanged, but for last frames that are no part of the motion, as
+            a rest pose that ends a file: these are made anew, and a note says so.
         frames: how many are added; 2 s without it.
         samples: in how many ways; seeds are counted up from `seed`, or from 1.
         method: a method, or "auto".
@@ -83,9 +85,11 @@ def forecast(
         )
     if not len(clip):
         raise RequestError("there is nothing to go on from", "the clip has no frame", "Name another clip.")
-    held = np.minimum(np.arange(len(clip) + frames), len(clip) - 1)
-    longer = clip.take(held)
-    gap = Gap(len(clip), len(longer))
+    longer = clip.take(np.minimum(np.arange(len(clip) + frames), len(clip) - 1))
+    last, odd = len(clip), {*strays(clip)}
+    while last - 1 in odd:
+        last -= 1
+    gap = Gap(last, len(longer))
     seen = Observation.without(longer, [gap])
     job = plan(longer, seen, method, None, None, {})[0]
     chosen = job.method if method == "auto" and job.method else method
@@ -114,9 +118,13 @@ def forecast(
                 "Ask for one: its report says why.",
             )
         done.append(one)
-    if job.note:
-        # Why it is no network's, which this was to be.
-        done = [_noted(one, job.note) for one in done]
+    # Why it is no network's, which this was to be.
+    notes = [job.note] if job.note else []
+    if last < len(clip):
+        which = f"frame {last} is" if last + 1 == len(clip) else f"frames {last} to {len(clip) - 1} are"
+        notes.append(f"{which} no part of the motion, and made anew")
+    for said in notes:
+        done = [_noted(one, said) for one in done]
     # The report tells what was asked for; its gap, what did it.
     asked = registry.name_of(method)
     first, *others = (replace(one, report=replace(one.report, method=asked)) for one in done)
