@@ -44,11 +44,12 @@ def test_what_follows_is_compared_with_what_was_before(cmu_walk):
     assert any("as much as the motion before it" in note for note in report.notes)
 
 
-def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk):
+@pytest.mark.parametrize(("start", "frames"), [(10, 50), (178, 13)])
+def test_a_body_that_glides_is_told_from_one_that_walks(cmu_walk, start, frames):
     """Between poses in which it faces the same way a straight line floats, and slides less than people do."""
     said = {}
     for method in ("linear", "small"):
-        (said[method],) = tasks.fill(cmu_walk, [Gap(10, 60)], method).report.gaps
+        (said[method],) = tasks.fill(cmu_walk, [Gap(start, start + frames)], method).report.gaps
     assert said["linear"].gliding > 0.4
     assert said["small"].gliding < 0.1
     glides = {m: any("it glides" in note for note in gap.notes) for m, gap in said.items()}
