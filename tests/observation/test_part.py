@@ -164,3 +164,21 @@ def test_a_part_of_a_mirror_image_points_as_its_original_does(cmu_walk):
 
     there = laid(reflect(cmu_walk), reflect(other)) * [-1.0, 1.0, 1.0]
     assert np.abs(there - laid(cmu_walk, other)).max() < 1e-6
+
+
+def test_a_part_beside_known_frames_is_led_to_and_from(cmu_walk, data):
+    """As long as the gap it is laid in, it would pop at both ends, and no gap would be left to tell of it."""
+    jump, hand = interpose.load(data / "cmu_jump.bvh"), cmu_walk.skeleton.index("RightHand")
+    pasted = cmu_walk.rotation.copy()
+    joints = [cmu_walk.skeleton.index(name) for name in ARM]
+    pasted[85:115, joints] = jump.rotation[40:70, joints]
+
+    def pops(clip):
+        return measures.acceleration(clip.positions()[:, hand])[82:118].max()
+
+    done = interpose.fill(cmu_walk, [Gap(85, 115, ARM)], parts=Part(jump, 40, 70, 85, ARM))
+    assert [(gap.start, gap.stop) for gap in done.report.gaps] == [(85, 91), (109, 115)]
+    assert pops(done.clip) < 0.4 * pops(cmu_walk.with_motion(pasted, cmu_walk.translation))
+    two = [Part(jump, 40, 70, 85, ARM), Part(jump, 10, 40, 115, ARM)]
+    done = interpose.fill(cmu_walk, [Gap(75, 155, ARM)], parts=two)
+    assert [(gap.start, gap.stop) for gap in done.report.gaps] == [(75, 85), (115, 121), (145, 155)]

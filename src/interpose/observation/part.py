@@ -17,10 +17,15 @@ from interpose.skeletons.fitting import SAME
 from interpose.skeletons.humanoid import find_humanoid
 from interpose.skeletons.mapping import find_mapping
 
+EASED = 0.2  # seconds that it takes to lead from one motion to another
+
 
 @dataclass(frozen=True)
 class Part:
     """Local rotations of some joints over some frames of another clip.
+
+    Where they begin, or end, beside frames of the completed clip that are known, or that another part gives,
+    EASED seconds of them lead from the one motion to the other.
 
     Attributes:
         clip: the other clip; its skeleton has the joints under the same names and with the same rest pose,
@@ -69,10 +74,18 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
                 why = f"two parts give it in the frames {to.start}:{to.stop}, or in some of them"
                 raise RequestError(f"there are two poses of {name}", why, "Give one of them.")
             rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
-            known[to, here] = True
+            known[_apart(part, known[:, here], clip.fps), here] = True
         _hung(rotation, clip, observation, part)
     laid = Observation(known, observation.translation, observation.pins)
     return clip.with_motion(rotation, clip.translation), laid
+
+
+def _apart(part: Part, known: np.ndarray, fps: float) -> slice:
+    """The frames of a part but for those that lead to where its joint is `known` (F,)."""
+    start, stop = part.at, part.at + part.stop - part.start
+    over = min(max(2, round(EASED * fps)), (stop - start - 1) // 2)
+    begins, ends = start > 0 and known[start - 1], stop < len(known) and known[stop]
+    return slice(start + over * int(begins), stop - over * int(ends))
 
 
 def _hung(rotation: np.ndarray, clip: Clip, observation: Observation, part: Part) -> None:
