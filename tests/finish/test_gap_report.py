@@ -6,23 +6,36 @@ import numpy as np
 import pytest
 
 from interpose.finish import complete
+from interpose.finish.gap_report import PARTS
 from interpose.methods.base import small
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping
 
 ARM = ("LeftArm", "LeftForeArm", "LeftHand")
+HIPS_AND_ARM = ("Hips", *ARM)
 
 
-@pytest.mark.parametrize("joints", [None, ARM])
-def test_errors_are_expected_of_the_joints_that_are_not_known(cmu_walk, joints):
+@pytest.mark.parametrize(
+    ("joints", "top", "share"),
+    [
+        (None, "Hips", 1.0),
+        (ARM, "LeftArm", PARTS["Arm"]),
+        (("RightFoot",), "RightFoot", PARTS["Foot"]),
+        (("RightLeg",), "RightLeg", PARTS["Leg"]),
+        (("Hips",), "Hips", PARTS["Hips"]),
+        (HIPS_AND_ARM, "Hips", np.mean([1.0, PARTS["Arm"]])),
+    ],
+)
+def test_errors_are_expected_of_the_joints_that_are_not_known(cmu_walk, joints, top, share):
+    """And of a part as much of what the network says as such parts are off by."""
     gap = Gap(75, 120, joints)
     done = complete(cmu_walk, Observation.from_gaps(cmu_walk, [gap]), small())
     (report,) = done.report.gaps
     said = 100 * done.raw.expected[75:120].mean()
     canonical = list(find_mapping(cmu_walk.skeleton).mapped[1])
-    below = cmu_walk.skeleton.below[canonical, cmu_walk.skeleton.index("LeftArm")]
-    hidden = len(canonical) if joints is None else below.sum() - 1  # where the arm begins is known
-    assert report.expected == pytest.approx(said * len(canonical) / hidden)
+    below = cmu_walk.skeleton.below[canonical, cmu_walk.skeleton.index(top)]
+    hidden = len(canonical) if joints is None else below.sum() - 1  # where it begins is known
+    assert report.expected == pytest.approx(share * said * len(canonical) / hidden)
     off = np.linalg.norm(done.clip.positions() - cmu_walk.positions(), axis=-1)[75:120][:, canonical]
     assert 0.3 < report.expected / (100 * off.sum() / (45 * hidden)) < 3
 
