@@ -19,7 +19,7 @@ from interpose.observation import Gap, Observation
 from interpose.skeletons import find_humanoid, find_mapping
 from interpose.skeletons.body import facing
 from interpose.skeletons.carrier import hips_of
-from interpose.skeletons.performers import performers
+from interpose.skeletons.performers import BODY, performers
 
 # A body that moves less than this in the middle of a gap, as a share of the motion around it, is dull: of 119
 # pieces of 2 s of the real motion of LAFAN1's validation performer 1 % are.
@@ -66,7 +66,6 @@ ROUND = 30.0
 LEGS = (0.1, 3.0)  # metres of a leg, of dolls and giants
 # How notes begin of who goes round once more, and of what is expected to be off.
 TURNS, DOUBTS = "flagged: it turns by", "flagged: joints are expected to be off by"
-BODY = 10  # joints: what hangs together and has fewer is a prop
 
 
 def sunk(finished: Clip, known: Observation, gap: Gap, first: int) -> list[str]:
