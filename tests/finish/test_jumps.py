@@ -129,3 +129,19 @@ def test_an_arm_that_whips_back_is_seen_among_frames_that_jitter(cmu_walk):
     assert excess > jumps.SLACK
     assert "over 4 frames" in words
     assert abs(frame - 130) <= 4
+
+
+def test_what_jumps_as_what_carries_it_is_not_blamed_for_it(cmu_walk):
+    """A knee that is lost while the hip, which is known, jumps by 30 cm and back."""
+    translation = cmu_walk.translation.copy()
+    translation[80:83, 0, 1] += 0.3
+    jolted, knee = cmu_walk.with_motion(cmu_walk.rotation, translation), ("LeftLeg", "LeftFoot")
+
+    def flags(clip):
+        (gap,) = interpose.fill(clip, [Gap(60, 100, knee)]).report.gaps
+        return [note for note in gap.notes if "velocity jumps" in note]
+
+    (told,) = flags(jolted)
+    assert told.endswith("there")
+    assert "; LeftLeg, from which it hangs, and which is measured, jumps" in told
+    assert not flags(cmu_walk)

@@ -11,6 +11,7 @@ from interpose.finish import feet, seams
 from interpose.finish.leading import led_over
 from interpose.finish.solve import Axes
 from interpose.finish.span import Span, write
+from interpose.geometry import measures
 from interpose.geometry.time import runs
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping
@@ -33,6 +34,8 @@ TORN, WILD = 200.0, 100.0
 LONE = 15.0
 # Seconds of motion that are known at least for it to tell how far velocities may jump inside of gaps.
 TELLS = 1.0
+# What hangs from a joint that jumps by so great a share of what it does itself jumps for that.
+CARRIES = 0.5
 # By how much a limit may be passed: what is softened stops at it.
 SLACK = 1.02
 # Seconds.
@@ -168,7 +171,6 @@ def excesses(
 ) -> list[tuple[float, str, int]]:
     """By how much the velocity jumps at the seams of a span, and those inside, exceed what they may (1: just
     not), in words, and at which frame; words call the first frame `first`."""
-    names = current.skeleton.names
     bounds = bounds or Bounds.untold(current.skeleton, current.fps)
     found = []
     edges = seams.edges(known, current.translated, (span.start, span.stop))
@@ -179,8 +181,23 @@ def excesses(
     ):
         if frames.size:
             size = np.linalg.norm(measure(current, known, frames), axis=-1)
-            found.append(_worst(size, most, frames, names, where, first))
+            found.append(_worst(size, most, frames, current, known, where, first))
     return found
+
+
+def _carried(current: Clip, known: Observation, joint: int, frame: int) -> str:
+    """Of a jump of a joint that hangs from one whose place is known what that is to blame for, in words."""
+    near, skeleton = slice(frame - 1, frame + 2), current.skeleton
+    told = np.atleast_1d(known.slice(near.start, near.stop).positions(skeleton).all(axis=0))
+    above = next((one for one in skeleton.ancestors(joint) if told[one]), None)
+    if above is None:
+        return ""
+    placed = current.slice(near.start, near.stop).positions()
+    own, its = (float(measures.acceleration(placed[:, one])[0]) for one in (joint, above))
+    if its < CARRIES * own:
+        return ""
+    name = skeleton.names[above]
+    return f"; {name}, from which it hangs, and which is measured, jumps by {100 * its:.2f} there"
 
 
 def whips(
@@ -198,18 +215,25 @@ def whips(
     size = np.linalg.norm(seams.jumps(current, known, frames, step), axis=-1) / step**2
     where = f"inside the gap, over {step} frames"
     most = np.array(bounds.beat / step**2)
-    return [_worst(size, most, frames, current.skeleton.names, where, first)]
+    return [_worst(size, most, frames, current, known, where, first)]
 
 
 def _worst(
-    size: np.ndarray, most: np.ndarray, frames: np.ndarray, names: tuple[str, ...], where: str, first: int
+    size: np.ndarray,
+    most: np.ndarray,
+    frames: np.ndarray,
+    clip: Clip,
+    known: Observation,
+    where: str,
+    first: int,
 ) -> tuple[float, str, int]:
     """An entry of `excesses`: of jumps (n, J) at some frames the one furthest beyond what it may be."""
     most = np.broadcast_to(most, size.shape)
     row, joint = np.unravel_index((size / most).argmax(), size.shape)
     own, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
     words = f"the velocity jumps by {100 * own:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
-    return own / limit, f"{words} ({names[joint]}, frame {first + frame})", frame
+    words += f" ({clip.skeleton.names[joint]}, frame {first + frame})"
+    return own / limit, words + _carried(clip, known, int(joint), frame), frame
 
 
 def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> list[tuple[int, int]]:
