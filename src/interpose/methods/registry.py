@@ -45,7 +45,7 @@ def names() -> tuple[str, ...]:
     return (*METHODS, *sorted(_offered()))
 
 
-def get(name: str | Method) -> Method:
+def get(name: str | Path | Method) -> Method:
     """The method of that name, always the same object; of a folder with weights, the method that runs them
     as they are now; an object that is one, as it is.
 
@@ -110,12 +110,12 @@ def _lacking(method: object) -> str:
     return " and ".join(f"no {part}" for part in ("name", "refuses", "complete") if not hasattr(method, part))
 
 
-def name_of(method: str | Method) -> str:
+def name_of(method: str | Path | Method) -> str:
     """The name that reports call a method by."""
     return str(method) if isinstance(method, str | PathLike) else method.name
 
 
-def told(name: str | Method, action: str = "", temperature: float = 1.0) -> Method:
+def told(name: str | Path | Method, action: str = "", temperature: float = 1.0) -> Method:
     """The method of that name, told what the motion is ("" for nothing) and how far answers may lie apart.
 
     Raises RequestError for a method that knows no actions or has one answer only, and for an action that it

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def pose_to_pose(
     frames: int | None = None,
     anchors: Mapping[int, Clip] = {},
     action: str = "",
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     path: Mapping[int, Any] | None = None,

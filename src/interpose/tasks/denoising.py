@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -35,7 +36,7 @@ def denoise(
     strength: float = 1.0,
     joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1; of

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -30,11 +31,11 @@ from interpose.tasks.windows import OVERLAP, Piece, joined, paste, put_together,
 def fill(
     clip: Clip,
     gaps: Sequence[Gap] | Observation,
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     max_gap: int | str | None = None,
     only: Iterable[int] | int | None = None,
     seed: int | None = None,
-    methods: Mapping[int, str | Method] | None = None,
+    methods: Mapping[int, str | Path | Method] | None = None,
     progress: Callable[[float], None] | None = None,
     action: str = "",
     parts: Sequence[Part] = (),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def forecast(
     clip: Clip,
     frames: int | None = None,
     samples: int = 1,
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
     temperature: float = 1.0,
     progress: Callable[[float], None] | None = None,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ def between(
     clip: Clip,
     keys: Sequence[int],
     action: str = "",
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     cut: bool = False,

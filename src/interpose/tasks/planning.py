@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -30,10 +31,10 @@ class Job:
 def plan(
     clip: Clip,
     observation: Observation,
-    method: str | Method,
+    method: str | Path | Method,
     max_gap: int | None,
     only: Iterable[int] | int | None,
-    methods: Mapping[int, str | Method],
+    methods: Mapping[int, str | Path | Method],
     action: str = "",
     temperature: float = 1.0,
     zero: int = 0,

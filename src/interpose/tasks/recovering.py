@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
@@ -36,7 +37,7 @@ def recover(
     clip: Clip,
     joints: Sequence[str] | None = None,
     frames: tuple[int, int] | None = None,
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
     place: bool = False,

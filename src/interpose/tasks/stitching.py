@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def stitch(
     align: bool = True,
     loop: bool = False,
     action: str = "",
-    method: str | Method = "auto",
+    method: str | Path | Method = "auto",
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Stitched:
@@ -186,7 +187,7 @@ def _jumps(done: Stitched, start: int) -> np.ndarray:
 
 
 def _tried(
-    line: timeline.Timeline, method: str | Method, action: str, seed: int | None
+    line: timeline.Timeline, method: str | Path | Method, action: str, seed: int | None
 ) -> tuple[list[int], list[str]]:
     """How long each gap should be, and why: as long as strides tell, or else as long as feet slide least with
     the motion beside it, from its length on up to TRIED more; of those in which least is flagged. Where
