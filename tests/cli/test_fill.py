@@ -485,6 +485,8 @@ def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data
     assert done.json["parts"] == [
         {"file": "jump.bvh", "frames": "40:48", "at": 70, "joints": ["RightArm", "RightHand"]}
     ]
+    other = hashlib.sha256(take.with_name("jump.bvh").read_bytes()).hexdigest()
+    assert done.json["others_sha256"] == {"jump.bvh": other}
     first, jump = load(take.with_name("take.filled.bvh")), load(take.with_name("jump.bvh"))
     arm = first.skeleton.index("RightArm")
     assert np.abs(first.rotation[70:78, arm] - jump.rotation[40:48, arm]).max() < 1e-5

@@ -34,6 +34,7 @@ def test_three_takes_on_one_timeline(run, takes):
     assert report["verb"] == "stitch"
     assert [clip["frames"] for clip in report["clips"]] == ["0:209", "229:271", "316:437"]
     assert [clip["file"] for clip in report["clips"]] == ["walk.bvh", "run.bvh", "jump.bvh"]
+    assert list(report["others_sha256"]) == ["run.bvh", "jump.bvh"]
     assert [gap["frames"] for gap in report["gaps"]] == ["209:229", "271:316"]
     for clip in report["clips"][1:]:
         assert clip["yaw"] != 0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from cyclopts import Parameter
 
 from interpose.cli.console import effort, progress
-from interpose.cli.outputs import Outputs, finish
+from interpose.cli.outputs import Outputs, finish, others_read
 from interpose.cli.reading import Reading, describe, split_names
 from interpose.cli.whole import Whole
 from interpose.errors import RequestError
@@ -116,7 +116,7 @@ def between(
         clip = done.clip
     retargeted = [str(path) for path, other in others.items() if other]
     more: dict[str, Any] = {"retargeted": retargeted} if retargeted else {}
-    more |= {"poses": [start, target, *anchor]} if laid else {}
+    more |= {"poses": [start, target, *anchor], **others_read(others, file)} if laid else {}
     more |= {"path": path} if path else {}
     more |= {"pinned": pin} if pin else {}
     told: dict[str, Any] = {"json": json, "force": force, "more": more, "read": read}

@@ -10,7 +10,7 @@ from cyclopts import Parameter
 
 from interpose.cli.batch import each
 from interpose.cli.console import effort, names, progress, say, say_json, say_table, seconds
-from interpose.cli.outputs import Outputs, finish, numbered
+from interpose.cli.outputs import Outputs, finish, numbered, others_read
 from interpose.cli.reading import Reading, describe, details
 from interpose.cli.whole import WHOLE, Whole
 from interpose.errors import RequestError
@@ -172,6 +172,7 @@ def fill(
         done = _retold(done, request.told)
     why = {number: request.why.get(number) or _why(left, most) for number, left in numbered(done)}
     more: dict[str, Any] = {"parts": parts_to_dict(request.parts)} if request.parts else {}
+    more |= others_read((one.file for one in request.parts), file)
     more |= {"layer": True} if layer or request.layer else {}
     more |= {"path": request.path} if request.path else {}
     more |= {"pinned": request.pins} if request.pins else {}

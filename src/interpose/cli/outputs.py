@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
@@ -181,7 +181,7 @@ def to_json(
         "interpose": __version__,
         "verb": verb,
         "input": str(file),
-        "input_sha256": sha256(file.read_bytes()).hexdigest(),
+        "input_sha256": _checksum(file),
         "output": str(output),
         **details(clip),
         "method": report["method"],
@@ -203,6 +203,16 @@ def to_json(
         "sources": completion.sources(),
         "units": UNITS,
     }
+
+
+def others_read(files: Iterable[Path], file: Path) -> dict[str, Any]:
+    """What a report says of the files that were read beside its input: the checksum of each."""
+    others = {str(one): _checksum(one) for one in dict.fromkeys(files) if one != file}
+    return {"others_sha256": others} if others else {}
+
+
+def _checksum(file: Path) -> str:
+    return sha256(file.read_bytes()).hexdigest()
 
 
 def gap_entries(completion: Completion) -> list[dict[str, Any]]:

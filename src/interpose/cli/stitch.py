@@ -11,7 +11,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from interpose.cli.console import names, progress, say, say_json, say_table, seconds
-from interpose.cli.outputs import Outputs, licence, print_report, to_json, write
+from interpose.cli.outputs import Outputs, licence, others_read, print_report, to_json, write
 from interpose.cli.reading import Reading, describe
 from interpose.cli.whole import Whole
 from interpose.errors import RequestError
@@ -125,7 +125,8 @@ def stitch(
     clips = [piece.clip for piece in pieces]
     with progress(f"stitching {len(clips)} clips", sum(map(len, clips))) as advance:
         done = tasks.stitch(clips, _lengths(frames, clips[0].fps), align, loop, action, method, seed, advance)
-    report = to_json("stitch", first, outputs.clip, done.clip, done, seed, {}, _more(pieces, done))
+    more = others_read((piece.file for piece in pieces), first) | _more(pieces, done)
+    report = to_json("stitch", first, outputs.clip, done.clip, done, seed, {}, more)
     report["units"] = {**report["units"], **UNITS}
     notes = write(outputs, force, done.clip, done, report)
     if json:
