@@ -15,7 +15,7 @@ from interpose import formats
 from interpose.clip import Clip, Skeleton
 from interpose.geometry import rotations
 from interpose.observation import Observation
-from interpose.skeletons import find_humanoid
+from interpose.skeletons import find_mapping
 
 # A joint turns about one axis where it is known to turn by so many degrees in so many different poses or
 # more, and about no other by more than so great a share of that: in 78 clips of CMU, HDM05 and Bandai-Namco
@@ -48,12 +48,11 @@ class Axes:
     def of(cls, clip: Clip, known: Observation, source: Any) -> Axes:
         """Those of a clip from a `source`: of a file that does not say which, knees, elbows and toes, by what
         of their rotations is known, (F, J)."""
-        own = cls.said(source)
-        body = find_humanoid(clip)
-        if own(clip.slice(0, 1)) or not body.mapping.usable:
+        own, mapping = cls.said(source), find_mapping(clip.skeleton)
+        if own(clip.slice(0, 1)) or not mapping.usable:
             return own
         single = {}
-        for joint in filter(None, (body.mapping[name] for name in BENDING)):
+        for joint in filter(None, (mapping[name] for name in BENDING)):
             frames = np.flatnonzero(known.rotation[:, joint])
             seen = clip.rotation[frames[:: -(-len(frames) // LOOKED_AT) or 1], joint]
             if (axis := _axis(seen)) is not None:
