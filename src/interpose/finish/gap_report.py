@@ -22,6 +22,7 @@ from interpose.skeletons import JOINTS, PARENTS, find_mapping
 PARTS = {"Hips": 0.5, "Spine": 1.8, "Spine1": 1.0, "Spine2": 1.0, "Neck": 0.35, "Shoulder": 0.9, "Arm": 1.1}
 PARTS |= {"ForeArm": 0.75, "UpLeg": 0.7, "Leg": 0.75, "Foot": 0.45}
 PART = 0.8
+MEASURED = 3.0  # seconds: of what is lost for longer nobody has measured it
 
 
 def gap_report(
@@ -127,7 +128,7 @@ def _part(clip: Clip, known: Observation) -> float:
     rows = dict(zip(*find_mapping(clip.skeleton).mapped))
     lost = {joint for joint, row in rows.items() if not known.rotation[:, row].all()}
     tops = [joint for joint in lost if PARENTS[joint] not in lost]
-    if not tops or lost == {*rows}:
+    if not tops or lost == {*rows} or len(known.rotation) > MEASURED * clip.fps:
         return 1.0
     names = [JOINTS[joint].removeprefix("Left").removeprefix("Right") for joint in tops]
     return float(
