@@ -1056,6 +1056,7 @@ def test_each_of_two_bodies_is_denoised_as_if_it_were_alone(duo, cmu_walk):
     one = tasks.denoise(noisy, joints=["LeftArm"]).clip
     assert np.array_equal(one.rotation[:, count:], noisy.rotation[:, count:])
     assert not np.array_equal(one.rotation[:, :count], noisy.rotation[:, :count])
+    assert np.array_equal(tasks.denoise(noisy, joints=[]).clip.rotation, noisy.rotation)
 
 
 def test_how_one_body_moves_does_not_say_how_another_one_may(duo, cmu_walk):

@@ -70,8 +70,7 @@ def denoise(
         for body in several:
             own = clip_of(clip, body)
             some = None if joints is None else [name for name in joints if name in own.skeleton.names]
-            if some != []:
-                bodies[body] = denoise(own, strength, some, frames, method, seed)
+            bodies[body] = denoise(own, strength, some, frames, method, seed)
         return _of_bodies(clip, bodies)
     swapped = swaps(clip, start, stop) if chosen is None and strength else []
     sides = put_back(clip, swapped)
