@@ -376,6 +376,11 @@ class Clip:
         """The same clip with other motion; the file's layout stays for writing."""
         return replace(self, rotation=rotation, translation=translation)
 
+    def scaled(self, factor: float) -> Clip:
+        """The motion of a body `factor` times as large, without what its file adds."""
+        skeleton = replace(self.skeleton, rest_translation=factor * self.skeleton.rest_translation)
+        return replace(self, skeleton=skeleton, translation=factor * self.translation, source=None)
+
     def joined(self, clips: Sequence[Clip]) -> Clip:
         """The motion of clips on this skeleton, one after another, with the file's layout of this one.
 

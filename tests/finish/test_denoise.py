@@ -164,6 +164,18 @@ def test_a_turned_and_shifted_input_gives_a_turned_and_shifted_result(cmu_walk, 
     assert _apart(interpose.denoise(moved(noisy)).clip, moved(interpose.denoise(noisy).clip)).mean() < 0.1
 
 
+@pytest.mark.parametrize("size", [0.1, 8.0])
+@pytest.mark.parametrize("sigma", [0.1, 0.4])
+def test_small_and_large_bodies_are_denoised_as_others(cmu_walk, size, sigma):
+    """Puppets and giants: what is shaky, and which feet stand, is seen by the size of the body."""
+    noisy = _shaken(cmu_walk, sigma)
+    shift = np.random.default_rng(5).normal(scale=0.02, size=noisy.translation.shape)
+    for clip in (noisy, cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation + shift)):
+        done, usual = interpose.denoise(clip.scaled(size)), interpose.denoise(clip)
+        assert _apart(done.clip.scaled(1 / size), usual.clip).max() < 1e-2
+        assert done.report.noise.noise == pytest.approx(size * usual.report.noise.noise)
+
+
 def test_only_what_is_chosen_changes(cmu_walk):
     noisy = _shaken(cmu_walk, 0.5)
     arm = noisy.skeleton.index("LeftArm")

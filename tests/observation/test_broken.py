@@ -155,14 +155,21 @@ def test_a_root_that_jumps_or_falls_to_the_origin_is_found(cmu_walk):
 
 
 @pytest.mark.parametrize(
-    "rig", [lambda clip: clip, lambda clip: under_root(clip, False)], ids=["root", "hips"]
+    ("rig", "size"),
+    [
+        (lambda clip: clip, 1.0),
+        (lambda clip: under_root(clip, False), 1.0),
+        (lambda clip: clip.scaled(0.1), 0.1),
+        (lambda clip: clip.scaled(8), 8.0),
+    ],
+    ids=["root", "hips", "puppet", "giant"],
 )
-def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig):
+def test_hips_that_are_somewhere_else_for_frames_are_found(cmu_walk, rig, size):
     clip = rig(cmu_walk)
     translation, hips = clip.translation.copy(), hips_of(clip.skeleton)
-    translation[50, hips, 0] += 0.15
-    translation[90:92, hips, 2] -= 0.2
-    translation[130:133, hips, 1] += 0.3
+    translation[50, hips, 0] += 0.15 * size
+    translation[90:92, hips, 2] -= 0.2 * size
+    translation[130:133, hips, 1] += 0.3 * size
     lost = ~broken(clip.with_motion(clip.rotation, translation)).translation
     assert np.argwhere(lost).tolist() == [[f, hips] for f in (50, 90, 91, 130, 131, 132)]
 

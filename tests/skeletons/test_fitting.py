@@ -47,16 +47,10 @@ def test_bodies_of_other_size_begin_over_the_same_floor_point(run, goes, frames)
     assert np.allclose(ways[1], 0.6 * ways[0], atol=1e-9)
 
 
-def _of_size(clip: Clip, size: float) -> Clip:
-    """A body so many times as large that moves alike."""
-    skeleton = replace(clip.skeleton, rest_translation=size * clip.skeleton.rest_translation)
-    return replace(clip, skeleton=skeleton, translation=size * clip.translation, source=None)
-
-
 @pytest.mark.parametrize("frames", [1, 60])
 def test_joints_with_positions_of_their_own_have_bones_too(cmu_walk, run, frames):
     """Written with six channels on every joint, a smaller body stays one, and moves as with three."""
-    child = _of_size(cmu_walk, 0.6).slice(0, frames)
+    child = cmu_walk.scaled(0.6).slice(0, frames)
     (plain, wanted), (made, scale) = fit(run, child), fit(six_channels(run), six_channels(child))
     assert scale == wanted < 0.7
     assert np.array_equal(made.rotation, run.rotation)
@@ -68,7 +62,7 @@ def test_joints_with_positions_of_their_own_have_bones_too(cmu_walk, run, frames
 
 def test_joints_that_give_way_do_so_on_bones_of_another_length(cmu_walk):
     joint = cmu_walk.skeleton.index("LeftLeg")
-    walk, child = six_channels(cmu_walk), six_channels(_of_size(cmu_walk, 0.5))
+    walk, child = six_channels(cmu_walk), six_channels(cmu_walk.scaled(0.5))
     shaken = walk.translation.copy()
     shaken[::2, joint] *= 1.04
     made = fit(walk.with_motion(walk.rotation, shaken), child)[0]
@@ -78,7 +72,7 @@ def test_joints_that_give_way_do_so_on_bones_of_another_length(cmu_walk):
 def test_joints_that_are_animated_keep_their_own_places(cmu_walk):
     """What stretches far, or is nowhere at rest, and all that is of one body."""
     joint = cmu_walk.skeleton.index("LeftHand")
-    walk, child = six_channels(cmu_walk), six_channels(_of_size(cmu_walk, 0.5))
+    walk, child = six_channels(cmu_walk), six_channels(cmu_walk.scaled(0.5))
     moved = walk.translation.copy()
     moved[:, joint] += np.linspace(0.0, 0.3, len(walk))[:, None]
     stretched = walk.with_motion(walk.rotation, moved)

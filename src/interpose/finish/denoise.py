@@ -38,6 +38,8 @@ from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import hips_of, line_of, placed
 from interpose.skeletons.targets import seated
 
+# Metres are those of a body of usual size (`feet.size`).
+
 # How stiff smoothers may be: from one that takes out hardly anything to one that leaves parts of a minute.
 STIFF = 10.0 ** np.arange(-1.5, 7.01, 0.5)
 # Seconds (standard deviation) over which smoothers are compared: someone stands, and then runs.
@@ -225,7 +227,8 @@ def _shaken(clip: Clip, free: Observation) -> float:
     # What does not hang from the hips, as a root that stays, trembles against them as they do themselves.
     below = [joint for joint in range(len(clip.skeleton)) if hips in clip.skeleton.ancestors(joint)]
     own = deviation(places[:, below] - places[:, [hips]])
-    return shaken if shaken > max(TREMBLES, ALIKE * own.max()) else 0.0
+    least = TREMBLES * feet.size(clip.skeleton)
+    return shaken if shaken > max(least, ALIKE * own.max()) else 0.0
 
 
 def _ease(filled: Clip, done: Clip, before: bool, after: bool) -> Clip:
@@ -299,19 +302,19 @@ def _smooth(clip: Clip, free: Observation, strength: float, noise: np.ndarray) -
     still = _calm_turns(clip, moves, strength)
     mapping = find_mapping(skeleton)
     joints = mapping.mapped[1] if mapping.usable else tuple(range(len(skeleton)))
-    noise = strength * noise
-    shaky = max(SHAKY, QUICK * (AROUND / clip.fps) ** 2)
+    noise, grown = strength * noise, feet.size(skeleton)
+    shaky = grown * max(SHAKY, QUICK * (AROUND / clip.fps) ** 2)
     near = np.where(noise > shaky, FAR * noise, np.inf)
     turns = _adds_up(clip, joints)
     source = still if turns else clip
     places = smoothed(_bounded(source.positions(), near)[:, joints], clip.fps, strength)
     done = solve(still, known, joints, places)
     unsteady = noise[feet.ends(skeleton)].max(initial=0.0)
-    if turns or unsteady <= UNSTEADY:
+    if turns or unsteady <= UNSTEADY * grown:
         return done
     # The heights of real feet are known as well as the rest: lifted clear of a floor, with 2 cm of noise they
     # are off by up to 12 cm in punches of CMU's, else by 6.
-    return feet.plant(done, known, (0, len(done)), step=max(STANCE, STRAYS * unsteady), lift=False)
+    return feet.plant(done, known, (0, len(done)), step=max(STANCE, STRAYS * unsteady / grown), lift=False)
 
 
 def _adds_up(clip: Clip, joints: Sequence[int]) -> bool:
@@ -322,7 +325,10 @@ def _adds_up(clip: Clip, joints: Sequence[int]) -> bool:
     child, parent = pairs.reshape(-1, 2).T
     places = clip.positions()
     ends, bones = deviation(places[:, child]), deviation(places[:, child] - places[:, parent])
-    return bool(ends.sum() > TINY * len(ends) and (ends**2).sum() > ADDS_UP * (bones**2).sum())
+    return bool(
+        ends.sum() > TINY * feet.size(clip.skeleton) * len(ends)
+        and (ends**2).sum() > ADDS_UP * (bones**2).sum()
+    )
 
 
 def _bounded(positions: np.ndarray, near: np.ndarray) -> np.ndarray:

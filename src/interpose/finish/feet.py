@@ -17,7 +17,7 @@ from interpose.finish.windows import envelope, ramp, rounded, spread
 from interpose.geometry import measures, rotations
 from interpose.geometry.time import runs
 from interpose.observation import Observation
-from interpose.skeletons import LEG_LENGTH, find_mapping
+from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import place_of
 
 # A contact is slower than the first speed (metres a second) somewhere and nowhere faster than the second; it
@@ -105,9 +105,8 @@ def ends(skeleton: Skeleton) -> list[int]:
 
 
 def size(skeleton: Skeleton) -> float:
-    """How large a body is, 1 for the one for which the lengths and speeds above were chosen: by its legs."""
-    length = find_mapping(skeleton).leg_length
-    return length / LEG_LENGTH if np.isfinite(length) and length > 0 else 1.0
+    """How large a body is, 1 for the one for which the lengths and speeds above were chosen."""
+    return find_mapping(skeleton).size
 
 
 def pairs(skeleton: Skeleton) -> np.ndarray:
@@ -324,7 +323,8 @@ def plant(
         stands: (F, 4) how likely left ankle and toe, right ankle and toe stand, 0 to 1, by the method that
             made the motion: a foot is held where it is slow and low, unless this says that it does not stand.
             NaN, and None, where it says nothing.
-        step: metres; what moves further while it is slow and low is a step, and no stance.
+        step: metres of a body of usual size; what moves further while it is slow and low is a step, and no
+            stance.
         lift: whether feet are kept above the floor, and clear of it while they are quick; else they are held
             along it alone, and stay as high as they are.
         only: the number of the leg in `legs` whose foot is held; else all are.

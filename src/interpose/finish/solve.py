@@ -20,14 +20,16 @@ from interpose.geometry.time import bending
 from interpose.observation import Observation
 from interpose.skeletons import JOINTS, find_mapping
 
-# Bones shorter than this (metres) point nowhere: CMU's hip joints, lower back and collars have no length.
+# Bones of a body of usual size that are shorter than this (metres) point nowhere: CMU's hip joints, lower
+# back and collars have no length.
 NO_LENGTH = 0.01
 # How strongly a fit is pulled towards the pose it starts from, and how strongly bones count that reach over a
 # joint without length: only what the bones at the joint itself leave open should follow either.
 PULL, FAR = 1e-4, 1e-3
 # Sine of the bend below which a knee or elbow tells nothing of the twist above it; from the second on, all.
 STRAIGHT, BENT = 0.1, 0.35
-# Gauss-Newton: steps, frames at once, and damping in square metres (a bone's length squared is about 0.1).
+# Gauss-Newton: steps, frames at once, and damping in square metres (a bone's length squared is about 0.1) of
+# a body of usual size.
 STEPS, BLOCK, DAMPING = 3, 512, 2e-3
 # See `formats.axes`.
 Axes = Callable[[Clip], dict[int, np.ndarray]]
@@ -126,11 +128,12 @@ def _aims(skeleton: Skeleton, known: Collection[int]) -> dict[int, list[tuple[in
     """
     bones = skeleton.rest_translation * skeleton.scale_above[:, None]
     _, placed = kinematics.forward(skeleton.rest_rotation, bones, skeleton.parents)
+    least = NO_LENGTH * find_mapping(skeleton).size
     nearest = {j: next((a for a in skeleton.ancestors(j) if a in known), None) for j in known}
     aims: dict[int, list[tuple[int, float]]] = {j: [] for j in sorted(known)}
 
     def apart(a: int, b: int) -> bool:
-        return float(np.linalg.norm(placed[a] - placed[b])) > NO_LENGTH
+        return float(np.linalg.norm(placed[a] - placed[b])) > least
 
     for joint in aims:
         above, weight = nearest[joint], 1.0
@@ -315,6 +318,7 @@ class Freedom:
         free: (F, d) 1 where they may, three columns for each.
         above: (n, movable) 1 where the known joint hangs below the one that may turn.
         by_shift: (3 n, 3 carriers) how much a shift of each carrier along each axis moves each known joint.
+        size: of the body, 1 for the usual one: it moves as that one would.
         bounds: what joints do not do.
     """
 
@@ -324,6 +328,7 @@ class Freedom:
     free: np.ndarray
     above: np.ndarray
     by_shift: np.ndarray
+    size: float
     bounds: Bounds
 
     @classmethod
@@ -337,7 +342,8 @@ class Freedom:
         free = (~np.repeat(np.concatenate(seen, axis=1), 3, axis=1)).astype(float)
         carried = skeleton.below[np.ix_(known, carriers)]
         by_shift = np.einsum("kc,ab->kacb", carried, np.eye(3)).reshape(3 * len(known), 3 * len(carriers))
-        return cls(known, movable, carriers, free, under[np.ix_(known, movable)], by_shift, bounds)
+        above, size = under[np.ix_(known, movable)], find_mapping(skeleton).size
+        return cls(known, movable, carriers, free, above, by_shift, size, bounds)
 
     def _levers(self, clip: Clip, placed: np.ndarray) -> np.ndarray:
         """(F, n, movable, 3) from each joint that may turn to what its turns move of each known one: its own
@@ -360,7 +366,7 @@ class Freedom:
         """The normal equations (F, d, d) and (F, d, 1) of a step, and the global rotations of the clip."""
         turned, placed = clip.kinematics()
         frames = len(clip)
-        lever = self._levers(clip, placed)
+        lever = self._levers(clip, placed) / self.size
         x, y, z, o = lever[..., 0], lever[..., 1], lever[..., 2], np.zeros_like(lever[..., 0])
         # A small turn d about the axes of the world moves a point by d x lever: rows of that matrix.
         by_turn = np.stack([np.stack([o, z, -y], -1), np.stack([-z, o, x], -1), np.stack([y, -x, o], -1)], 2)
@@ -373,7 +379,7 @@ class Freedom:
                 column = 3 * self.movable.index(joint)
                 by_turn[..., column : column + 3] @= world @ np.swapaxes(world, -1, -2)
         jacobian = np.concatenate([by_turn, by_shift], axis=2) * self.free[:, None]
-        miss = (positions - placed[:, self.known]).reshape(frames, -1, 1)
+        miss = (positions - placed[:, self.known]).reshape(frames, -1, 1) / self.size
         if weights is None:
             weights = np.ones(positions.shape)
         axes = weights if weights.ndim == 3 else np.repeat(weights[..., None], 3, axis=2)
@@ -405,7 +411,7 @@ class Freedom:
         done = rotations.normalize(rotations.multiply(rotations.exp(turn), rotation[:, self.movable]))
         free = self.free[:, :turns:3, None] > 0
         rotation[:, self.movable] = np.where(free, done, rotation[:, self.movable])
-        shift = to_parent(step[:, turns:].reshape(frames, -1, 3), self.carriers)
+        shift = self.size * to_parent(step[:, turns:].reshape(frames, -1, 3), self.carriers)
         translation[:, slots] += shift / skeleton.scale_above[self.carriers][:, None]
         done, held = clip.with_motion(rotation, translation), self.bounds.held
         for joint in [] if held is None else np.flatnonzero(held.any(axis=0)):

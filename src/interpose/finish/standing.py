@@ -28,7 +28,8 @@ GRAVITY = 9.81  # metres per second squared
 TORN = 5.0  # metres a second, of all joints in the mean: no motion does that
 PULL = 2.0  # times gravity: nobody comes down faster, as far as can be told
 ROUNDS = 40  # at most, of finding what stands, and where that puts the body
-# Metres a frame that what stands moves at 30 fps, as far as noise on places counts beside it.
+# Metres a frame that what stands of a body of usual size moves at 30 fps, as far as noise on places counts
+# beside it.
 STEADY = 0.004
 
 
@@ -70,7 +71,8 @@ def steadied(clip: Clip, noise: float) -> Clip:
         return clip
     full = Observation.full(clip)
     joints = _supports(full, np.ones(len(clip), bool), clip)
-    weight = np.full(len(clip), 30 / clip.fps * (STEADY / noise) ** 2)
+    steady = STEADY * feet.size(clip.skeleton)
+    weight = np.full(len(clip), 30 / clip.fps * (steady / noise) ** 2)
     return _placed(clip, carrier, joints, weight, False)
 
 

@@ -82,6 +82,8 @@ def broken(clip: Clip) -> Observation:
     LONGEST (LONGEST_PLACE of the hips and of places) in which it snaps to its rest value (or to no rotation,
     or to the origin) or jumps away and back, and spikes of up to three frames, also at the ends.
     """
+    # Seen as that of a body of usual size, for which metres are chosen.
+    clip = clip.scaled(1 / find_mapping(clip.skeleton).size)
     seen, skeleton, placing = Observation.full(clip), clip.skeleton, placed(clip)
     none = np.tile(rotations.identity(), (len(skeleton), 1))
     turned = rotations.continuous(clip.rotation)

@@ -21,6 +21,7 @@ from interpose.observation.repeated import but_repeated, doubled, repeated, repe
 from interpose.observation.steps import STILL, Steps, turns
 from interpose.observation.stiff import TELEPORTS, TIMES
 from interpose.observation.tremor import FEWEST, NOISY, body_of, bursts, deviation, restless
+from interpose.skeletons import find_mapping
 from interpose.skeletons.carrier import STILL as UNMOVED
 from interpose.skeletons.carrier import hips_of, placed
 from interpose.skeletons.performers import Joints, by_itself, clip_of, meant
@@ -239,7 +240,8 @@ def _noisy(clip: Clip, known: Observation, findings: list[Finding]) -> list[Find
         return []
     clip = _led_over(clip, findings)
     places = clip.positions()[:, body_of(clip)]
-    all_along = [(0, len(clip))] if deviation(places).mean() > NOISY else []
+    limit = NOISY * find_mapping(clip.skeleton).size
+    all_along = [(0, len(clip))] if deviation(places).mean() > limit else []
     found = [
         Finding(
             "noisy", None, a, b, f"trembles by {100 * deviation(places[a:b]).mean():.1f} cm along each axis"

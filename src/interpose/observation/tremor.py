@@ -20,9 +20,9 @@ FEWEST = 8  # frames: less motion cannot be told from noise
 # Frames a second: with fewer, what is quick jumps from one to the next as noise does. Clean clips at 24 are
 # moved by .4 cm at most, some at 20 by 24 cm.
 SLOWEST = 23.0
-# Metres by which joints tremble, in the mean, in frames that are noisy by themselves: the median within so
-# many seconds. Of 142 clips of all data sets one trembles by as much, in fits. A clip of which more is noisy
-# is so all along, and the median of all of it tells its noise.
+# Metres by which joints of a body of usual size tremble, in the mean, in frames that are noisy by themselves:
+# the median within so many seconds. Of 142 clips of all data sets one trembles by as much, in fits. A clip of
+# which more is noisy is so all along, and the median of all of it tells its noise.
 NOISY, WINDOW, MOSTLY = 0.006, 0.5, 0.6
 # Radians by which a joint alone turns to and fro in such frames: at SLOW frames a second, less with more, and
 # at least; and so many times as much as it does in the rest. Of 276 clips of all data sets 17 tremble so, ten
@@ -58,7 +58,8 @@ def bursts(clip: Clip) -> list[tuple[int, int]]:
     if not _tells(clip):
         return []
     places = clip.positions()[:, body_of(clip)]
-    return _ranges(trembling(places).mean(axis=1, keepdims=True), NOISY, clip, 1.0)[0]
+    limit = NOISY * find_mapping(clip.skeleton).size
+    return _ranges(trembling(places).mean(axis=1, keepdims=True), limit, clip, 1.0)[0]
 
 
 def body_of(clip: Clip) -> list[int]:

@@ -147,6 +147,13 @@ class Mapping:
         """What positions are multiplied with to give them the canonical leg."""
         return LEG_LENGTH / self.leg_length
 
+    @property
+    def size(self) -> float:
+        """How large the body is, by its legs: 1 for one for which lengths and speeds in metres are chosen,
+        and where it has none."""
+        length = self.leg_length
+        return length / LEG_LENGTH if np.isfinite(length) and length > 0 else 1.0
+
 
 @lru_cache(maxsize=64)
 def find_mapping(skeleton: Skeleton) -> Mapping:
