@@ -47,6 +47,7 @@ from interpose.training.base import (  # noqa: E402
     chosen,
     draw_task,
     relief,
+    scatter,
     spoil,
     train_base,
     validate,
@@ -548,7 +549,7 @@ def test_losses_are_of_what_is_wrong(drawn):
         stands = (placed[:, :, list(FEET)].diff(dim=1).norm(dim=-1) < STANDS).float()
         said = torch.nn.functional.pad(contact * (2 * stands - 1), (0, 0, 1, 0))
         answer = Answer(motion, said, torch.full((2, 40), risk))
-        found = losses.parts(answer, drawn.rotation, placed, known, drawn.bones)
+        found = losses.parts(answer, drawn.rotation, placed, known, drawn.bones, torch.eye(3).expand(2, 3, 3))
         return {name: float(value) for name, value in found.items()}
 
     true = parts()
@@ -601,11 +602,39 @@ def test_joints_of_a_pose_count_each_by_itself_or_together(drawn):
     for together in (0, 1):
         losses = Losses(BaseSettings(together=together))
         for name, truth in (("one", one), ("all", all_alike)):
-            said = losses.parts(answer, drawn.rotation, truth, known, drawn.bones)
+            said = losses.parts(
+                answer, drawn.rotation, truth, known, drawn.bones, torch.eye(3).expand(2, 3, 3)
+            )
             off[name, together] = float(said["position"])
     assert off["one", 0] == pytest.approx(0.01, abs=1e-4)
     assert off["all", 0] == pytest.approx(off["all", 1], rel=0.05)
     assert off["one", 1] == pytest.approx(0.22 / np.sqrt(COUNT), abs=1e-3)
+
+
+def test_joints_count_along_the_axes_of_the_body_as_they_are_scattered(drawn, walk_pack):
+    """Who walks is further from the middle of the way along it than across it; and so wherever it leads."""
+    counts = scatter(Poses([walk_pack("cmu")], ("train",), ("",), 30, torch.device("cpu")))
+    assert counts.shape == (COUNT, 3)
+    assert counts.square().mean().item() == pytest.approx(1)
+    assert (counts[:, 0] > 2 * counts[:, 2]).all()
+    known = torch.ones(2, 40, COUNT + 1)
+    known[:, 10:30] = 0
+    placed, losses = drawn.positions(), Losses(BaseSettings(), counts)
+    motion = Motion(kinematics.local_rotations(drawn.rotation, PARENTS), drawn.root)
+    answer = Answer(motion, torch.zeros(2, 40, len(FEET)), torch.zeros(2, 40))
+
+    def off(way: list[float], away: torch.Tensor) -> float:
+        """How wrong it is where the truth lies a centimetre along the axes of the body, but for the hips."""
+        truth = placed + 0.01 * torch.tensor(way) @ away.T
+        truth[:, :, 0] = placed[:, :, 0]
+        found = losses.parts(answer, drawn.rotation, truth, known, drawn.bones, away.expand(2, 3, 3))
+        return float(found["position"])
+
+    for yaw in (0.0, 1.0):
+        away = rotations.to_matrix(rotations.about("Y", torch.tensor(yaw)))
+        for axis, way in enumerate(np.eye(3).tolist()):
+            wanted = 0.01 * float(counts[1:, axis].sum()) / COUNT
+            assert off(way, away) == pytest.approx(wanted, rel=1e-2), (yaw, axis)
 
 
 def test_a_batch_is_as_hard_as_its_starting_point_is_wrong(drawn):

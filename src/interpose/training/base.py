@@ -21,10 +21,12 @@ from interpose.datasets import Pack
 from interpose.errors import RequestError, unknown
 from interpose.geometry import kinematics, rotations
 from interpose.geometry.constant import Constant
+from interpose.geometry.ground import FLOOR
 from interpose.methods.weights import Card
-from interpose.models.base import CONFIGS, COUNT, Answer, Base, BaseConfig, Motion
+from interpose.models.base import CONFIGS, COUNT, Answer, Base, BaseConfig, Motion, turned_by
 from interpose.observation.corruption import LIMBS
 from interpose.skeletons import FEET, JOINTS, PARENTS
+from interpose.skeletons.body import facing
 from interpose.training.budget import Budget
 from interpose.training.device import mixed, pick_device, processes, send
 from interpose.training.loop import SHARE, SOME, SWITCH, Settings, Trainer, of_kind, recorded, restore, taught
@@ -35,7 +37,10 @@ LOWER = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("U
 HANDS_FEET = [JOINTS.index(side + part) for side in ("Left", "Right") for part in ("Hand", "Foot")]
 ENDS = [*HANDS_FEET, JOINTS.index("Head")]
 SHORTEST = 30  # frames; clips that are shorter are left out
-JUDGED = 10 + 45 + 1  # frames of a window that is validated: known ones, the longest gap, and one more
+KNOWN = 10  # frames before a gap
+JUDGED = KNOWN + 45 + 1  # frames of a window that is validated: known ones, the longest gap, and one more
+# Windows that tell how far joints are from their mean, and frames of each: as many as in L2P's statistics.
+SCATTERED, SEEN_AT_ONCE = 2048, 50
 # A foot stands that moves by less than this in a frame, in metres (.15 m a second).
 STANDS = 0.005
 STANDING = Constant(FEET)
@@ -92,7 +97,7 @@ class BaseSettings(Settings):
         "labelled": SHARE,
         "dropout": (0, 0.9),
         "pace": SHARE,
-        **dict.fromkeys(("muon", "mirror", "together", *WIRING), SWITCH),
+        **dict.fromkeys(("muon", "mirror", "together", "scattered", *WIRING), SWITCH),
     }
 
     config: str = "small"  # one of CONFIGS
@@ -134,6 +139,9 @@ class BaseSettings(Settings):
     relative: float = 0.0
     # Whether a pose is off by the root of its joints' mean square, as L2P has it; else by their mean.
     together: int = 0
+    # Whether joints are off, along each axis of the body, in units of how far they are from their mean there,
+    # as L2P has it; else in metres along all.
+    scattered: int = 0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -261,15 +269,37 @@ def spoil(motion: Motion, noisy: Tensor, worst: float, seed: int) -> Motion:
     return Motion(rotations.multiply(local, rotations.exp(size[..., None] * turns)), moved)
 
 
-class Losses:
-    """What is wrong with an answer, as scalars by name."""
+def scatter(poses: Poses) -> Tensor:
+    """(22, 3) how much errors count of each joint along the axes of the body, 1 in the mean of squares: the
+    further joints are from their mean there, in windows around their middle, the less.
 
-    def __init__(self, settings: BaseSettings) -> None:
-        self.settings = settings
+    So L2P counts (Harvey et al. 2020), to which errors across the way are twice as wide as those along it.
+    """
+    drawn = poses.spread(SCATTERED, min(SEEN_AT_ONCE, int(poses.counts.max())))
+    placed = drawn.positions()
+    middle = placed[:, :, :1].mean(dim=1, keepdim=True) * FLOOR.beside(placed)
+    turned = rotations.about("Y", -facing(placed[:, KNOWN - 1]))[:, None, None]
+    deviation = rotations.rotate(turned, placed - middle).flatten(0, 1).std(dim=0)
+    share = 1 / deviation.clamp(min=1e-3)
+    return share / share.square().mean().sqrt()
+
+
+class Losses:
+    """What is wrong with an answer, as scalars by name.
+
+    Args:
+        settings: what counts how much.
+        counts: (22, 3) how much errors of positions count, of each joint along the axes of the body; alike
+            without them.
+    """
+
+    def __init__(self, settings: BaseSettings, counts: Tensor | None = None) -> None:
+        self.settings, self.counts = settings, counts
 
     def parts(
-        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor
+        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor, away: Tensor
     ) -> dict[str, Tensor]:
+        """`away` (B, 3, 3) turns rows into the heading of the body."""
         turned, said = answer.motion.forward(bones)
         # Frames in which something is missing; each motion counts the same, however long its gap is.
         missing = (known < 1).any(dim=2).to(said.dtype)
@@ -289,6 +319,8 @@ class Losses:
             answer.contact[:, 1:], stands, reduction="none"
         ).mean(dim=2)
         error = off.detach().mean(dim=2)
+        if self.counts is not None:
+            off = (turned_by(said - placed, away) * self.counts).norm(dim=-1)
         # The root has no gradient at zero.
         pose = off.square().mean(dim=2).clamp(min=1e-10).sqrt() if self.settings.together else off.mean(dim=2)
         return {
@@ -302,9 +334,9 @@ class Losses:
         }
 
     def __call__(
-        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor
+        self, answer: Answer, rotation: Tensor, placed: Tensor, known: Tensor, bones: Tensor, away: Tensor
     ) -> Tensor:
-        parts = self.parts(answer, rotation, placed, known, bones)
+        parts = self.parts(answer, rotation, placed, known, bones, away)
         return torch.stack([getattr(self.settings, name) * part for name, part in parts.items()]).sum()
 
 
@@ -394,7 +426,8 @@ def train_base(
     held_out = Poses(packs, ("validation",), labels, SHORTEST, device).spread(128, JUDGED)
     model = Base(BaseConfig(**{**before, "labels": labels})) if before else begin(settings, labels, start)
     model = model.to(device)
-    losses, batch = Losses(settings), max(1, settings.batch // processes())
+    losses = Losses(settings, scatter(poses) if settings.scattered else None)
+    batch = max(1, settings.batch // processes())
     # No longer than the network can see with what is around them; nor, where all clips are short, as a user's
     # own may be, than fit into them.
     room = min(model.config.longest, int(poses.counts.max())) - 2 * settings.context
@@ -421,7 +454,7 @@ def train_base(
             said = model.encoder(seen, drawn.label, drawn.bones)
         answer = model.answer(start, said, given.local, known)
         weight = relief(start.placed, placed, known) ** -settings.relative
-        return weight * losses(answer, drawn.rotation, placed, known, drawn.bones)
+        return weight * losses(answer, drawn.rotation, placed, known, drawn.bones, start.away)
 
     def optimizer(parameters: list[nn.Parameter]) -> torch.optim.Optimizer | Muon:
         if settings.muon:
@@ -469,8 +502,8 @@ def validate(model: nn.Module, batch: Batch) -> dict[str, float]:
     local, placed = kinematics.local_rotations(batch.rotation, PARENTS), batch.positions()
     plain = Base(replace(model.config, velocities=False)).to(placed.device)
     for gap in (5, 15, 30, 45):
-        part = slice(0, 10 + gap + 1)
-        inside = slice(10, 10 + gap)
+        part = slice(0, KNOWN + gap + 1)
+        inside = slice(KNOWN, KNOWN + gap)
         known = placed.new_ones(len(placed), part.stop, COUNT + 1)
         known[:, inside] = 0
         pins = torch.zeros(known.shape[0], part.stop, COUNT, dtype=torch.bool, device=placed.device)
