@@ -565,6 +565,12 @@ def test_losses_are_of_what_is_wrong(drawn):
     assert least < parts(shift=0.001, risk=best + 1)["risk"]
 
 
+def test_clips_that_are_too_short_to_learn_from_are_counted(walk_pack):
+    pack = replace(walk_pack("cmu"), starts=np.array([0, 180, 209]), splits=np.array(["train", "train"]))
+    told = [Poses([pack], ("train",), ("",), longest, torch.device("cpu")).told for longest in (29, 30)]
+    assert told == ["209 frames of train", "180 frames of train (1 clip of less than 30 frames left out)"]
+
+
 def test_motions_are_shown_faster_and_slower(walk_pack):
     """The same poses on the same way, at another pace: who walks gets as much further, or less far."""
     poses = Poses([walk_pack("cmu")], ("train",), ("",), 30, torch.device("cpu"))

@@ -477,9 +477,7 @@ def train_base(
         about={"network": asdict(model.config)},
         data=taught(kept, splits),
     )
-    return trainer.go(
-        f"{settings.config}, {poses.frames:,} frames of {', '.join(splits)}, on {device}", start
-    )
+    return trainer.go(f"{settings.config}, {poses.told}, on {device}", start)
 
 
 def judge(card: Card, pack: Pack) -> dict[str, float]:

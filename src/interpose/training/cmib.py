@@ -195,9 +195,7 @@ def train_cmib(
         about={"config": asdict(model.config)},
         data=taught(packs, splits),
     )
-    return trainer.go(
-        f"{poses.frames:,} frames of {', '.join(splits)}, {len(labels) - 1} labels, on {device}", start
-    )
+    return trainer.go(f"{poses.told}, {len(labels) - 1} labels, on {device}", start)
 
 
 @torch.no_grad()

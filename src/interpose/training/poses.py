@@ -59,7 +59,7 @@ def labels_of(packs: Sequence[Pack], splits: Sequence[str], before: Sequence[str
 
 
 class Poses:
-    """All clips of some splits that are long enough, in memory."""
+    """All clips of some splits that are long enough, in memory; `told` is what to say of them."""
 
     def __init__(
         self,
@@ -69,11 +69,15 @@ class Poses:
         longest: int,
         device: torch.device,
     ) -> None:
-        turned, root, bones, label, counts = [], [], [], [], []
+        turned, root, bones, label, counts, short = [], [], [], [], [], 0
         for pack in packs:
             for clip in range(len(pack.names)):
                 part = slice(pack.starts[clip], pack.starts[clip + 1])
-                if pack.splits[clip] in splits and part.stop - part.start >= longest:
+                if pack.splits[clip] not in splits:
+                    continue
+                if part.stop - part.start < longest:
+                    short += 1
+                else:
                     turned.append(pack.rotation[part])
                     root.append(pack.root[part])
                     bones.append(pack.bones[clip])
@@ -87,6 +91,8 @@ class Poses:
                 f"the packs hold no clip of {', '.join(splits)} with {longest} frames or more",
                 "Make packs of sets with performers of both (lafan1, bandai, cmu): interpose data pack.",
             )
+        left = f" ({short} clip{'s' * (short != 1)} of less than {longest} frames left out)" if short else ""
+        self.told = f"{sum(counts):,} frames of {', '.join(splits)}{left}"
         self.device, self.counts = device, np.array(counts)
         self.starts = np.concatenate([[0], np.cumsum(counts)])[:-1]
         self.turned = torch.from_numpy(np.concatenate(turned)).to(device)
@@ -95,10 +101,6 @@ class Poses:
         self.label = torch.tensor(label, device=device)
         self.sides = torch.tensor(SIDES, device=device)
         self.mirrored = torch.tensor(mirrored(labels), device=device)
-
-    @property
-    def frames(self) -> int:
-        return int(self.counts.sum())
 
     def at(self, clip: np.ndarray, first: np.ndarray, length: int) -> Batch:
         """Windows of the given clips from the given frames on."""
