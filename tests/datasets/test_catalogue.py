@@ -83,6 +83,21 @@ def test_pack_holds_positions_and_no_test_performer(published, tmp_path):
     assert rotations.angle(turned, body.rotations(clip)).max() < 2e-4
 
 
+def test_a_performer_on_two_skeletons_has_two_rest_poses(data, tmp_path):
+    """CMU's trials lie there as BVH or as AMC, whose joints have other axes."""
+    for path in ("bvh/02/02_01.bvh", "asf_amc/02/02_03.amc", "asf_amc/02/02.asf"):
+        (tmp_path / "cmu" / path).parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy(data / "cmu_02_03.amc", tmp_path / "cmu/asf_amc/02/02_03.amc")
+    shutil.copy(data / "cmu_02.asf", tmp_path / "cmu/asf_amc/02/02.asf")
+    alone = build_pack("cmu", tmp_path)
+    shutil.copy(data / "cmu_walk.bvh", tmp_path / "cmu/bvh/02/02_01.bvh")
+    both = build_pack("cmu", tmp_path)
+    row = both.names.tolist().index("02_03")
+    part = slice(both.starts[row], both.starts[row + 1])
+    assert np.array_equal(both.rotation[part], alone.rotation)
+    assert np.array_equal(both.bones[row], alone.bones[0])
+
+
 def test_what_is_not_there_is_said(tmp_path):
     with pytest.raises(FileError, match="no clips of lafan1"):
         clips("lafan1", tmp_path)

@@ -49,6 +49,13 @@ def test_a_run_that_saw_who_it_is_judged_on_is_no_measure(runs):
     assert "no measure" not in str(compare(runs[:1]))
 
 
+def test_a_run_that_is_not_at_its_end_is_named(runs):
+    assert "budget" not in str(compare(runs))
+    log = runs[1] / "log.jsonl"
+    log.write_text(log.read_text() + json.dumps({"step": 11, "hours": 0.11, "fraction": 0.05, "gap15": 9}))
+    assert "Not at the end of their budget yet: squared (5 %)." in str(compare(runs))
+
+
 @pytest.mark.parametrize("spoil", ["no log", "empty", "no json", "another file", "no folder"])
 def test_what_is_no_run(runs, spoil):
     log = runs[1] / "log.jsonl"

@@ -340,6 +340,10 @@ def test_a_skeleton_by_name(tmp_path, body):
         formats.load(tmp_path / "HDM_xy.bvh", skeleton=tmp_path / "HDM_xy.asf")
     with pytest.raises(RequestError, match="frame rate"):
         formats.load(moved, skeleton=tmp_path / "HDM_xy.asf", fps=0)
+    with pytest.raises(RequestError, match="frame rate"):
+        formats.load(moved, skeleton=tmp_path / "HDM_xy.asf", fps="120")  # type: ignore[arg-type]
+    with pytest.raises(RequestError, match="skeleton"):
+        formats.load(moved, skeleton=3)  # type: ignore[arg-type]
 
 
 # Writing -------------------------------------------------------------------------------------------------
@@ -574,6 +578,7 @@ def test_damaged_skeletons(tmp_path, old, new, why):
         ("\nltibia 23.4\nlfoot -11.7 -6.1\n", "\n", "frame 3 lacks its last bones: it is truncated"),
         (" -6.1\n", "", "line 18: lfoot has 1 numbers"),
         (":DEGREES", ":SAMPLES-PER-SECOND x", "line 3: the frame rate is 'x'"),
+        (":DEGREES", ":SAMPLES-PER-SECOND 0.1", "line 3: the frame rate is '0.1'"),
     ],
 )
 def test_damaged_motions(tmp_path, old, new, why):

@@ -13,6 +13,7 @@ from interpose import formats
 from interpose.clip import Clip, Skeleton
 from interpose.errors import FileError, RequestError
 from interpose.geometry import rotations
+from interpose.skeletons import find_mapping
 
 
 def motion_lines(path):
@@ -90,6 +91,33 @@ def test_who_lies_may_be_read_back_standing_and_it_is_said(cmu_walk, tmp_path):
         np.testing.assert_allclose(back.positions(), lies.positions(), atol=1e-4)
         assert not formats.save(back, tmp_path / "again.bvh", force=True), "it was given"
     assert not formats.save(cmu_walk, tmp_path / "walk.bvh")
+
+
+@pytest.mark.parametrize(("leg", "said"), [(0.3, True), (0.6, False), (0.9, False), (1.5, True)])
+def test_bodies_whose_unit_would_be_mistaken_are_told_of(cmu_walk, tmp_path, leg, said):
+    """Legs of a small child in centimetres are those of a grown-up in inches."""
+    body = cmu_walk.scaled(leg / find_mapping(cmu_walk.skeleton).leg_length)
+    notes = formats.save(body, tmp_path / "body.bvh")
+    assert ["--unit=cm" in note for note in notes] == [True] * said
+    back = [formats.load(tmp_path / "body.bvh", unit=unit) for unit in ("cm", None)]
+    off = [np.abs(some.positions() - body.positions()).max() for some in back]
+    assert off[0] < 1e-4
+    assert (off[1] > 0.1) == said
+
+
+def test_bones_of_amc_end_where_they_did(data, tmp_path):
+    clip = formats.load(data / "cmu_02_03.amc")
+    formats.save(clip, tmp_path / "walk.bvh")
+    nodes = {node.name: node for node in formats.load(tmp_path / "walk.bvh").source.header.nodes}
+    bones = {bone.name: bone for bone in clip.source.asf.bones}
+    ends = [name for name, node in nodes.items() if node.ends]
+    assert {"head", "ltoes", "rtoes", "lthumb"} < {*ends}
+    for name in ends:
+        length = 100 * clip.source.unit * bones[name].length
+        assert np.linalg.norm(nodes[name].ends[0]) == pytest.approx(length, abs=1e-4), name
+    # They go on as their bones do: feet point ahead, and down a little.
+    toe = np.array(nodes["ltoes"].ends[0])
+    assert toe[2] > 0.9 * np.linalg.norm(toe)
 
 
 @pytest.mark.parametrize("up", ["y", "z", "x", "-y", "-z", "-x"])

@@ -45,17 +45,31 @@ def test_a_part_is_held_out_and_what_cannot_be_used_is_said(takes):
 
 
 def test_of_many_takes_each_fifth_is_held_out(takes):
+    clip = load(takes / "a.bvh")
     for number in range(5):
-        shutil.copy(takes / "a.bvh", takes / f"z{number}.bvh")
+        save(clip.slice(number + 1, len(clip)), takes / f"z{number}.bvh")
     assert own_pack(takes, 56).splits.tolist() == ["train"] * 4 + ["validation"] + ["train"] * 2
 
 
 def test_a_short_fifth_take_does_not_keep_the_others_from_being_used(takes):
-    short = load(takes / "a.bvh").slice(0, 40)
+    clip = load(takes / "a.bvh")
     for number in range(3):
-        save(short, takes / f"b{number}.bvh")
-    shutil.copy(takes / "a.bvh", takes / "z.bvh")
+        save(clip.slice(number, number + 40), takes / f"b{number}.bvh")
+    save(clip.slice(1, len(clip)), takes / "z.bvh")
     assert own_pack(takes, 56).splits.tolist() == ["train", "validation"] * 6
+
+
+def test_a_take_that_is_there_twice_is_not_learned_from_and_held_out(takes):
+    """In another format, too, and under another name."""
+    clip = load(takes / "a.bvh")
+    for number in range(4):
+        save(clip.slice(number + 1, len(clip)), takes / f"z{number}.bvh")
+    once = own_pack(takes, 56)
+    save(load(takes / "z3.bvh"), takes / "day 1" / "z3.npz")
+    shutil.copy(takes / "a.bvh", takes / "z4.bvh")
+    said: list[str] = []
+    assert len(own_pack(takes, 56, said.append).names) == len(once.names)
+    assert sum("once more" in line for line in said) == 2
 
 
 def test_what_interpose_made_is_no_take(takes):
@@ -130,6 +144,7 @@ def test_weights_that_are_there_are_not_replaced(tmp_path, capsys):
 def test_takes_of_one_rig_may_move_different_joints(takes):
     """As two programs export them: the root alone, or positions of every joint."""
     clip = load(takes / "a.bvh")
+    clip = clip.slice(1, len(clip))
     everything = tuple(range(len(clip.skeleton)))
     save(Clip(clip.skeleton, clip.rotation, clip.local_translation(), clip.fps, everything), takes / "b.bvh")
     pack = own_pack(takes, 56)

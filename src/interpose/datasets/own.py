@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from interpose.clip import Clip
 from interpose.datasets.catalogue import FPS
 from interpose.datasets.pack import Pack, Part, assemble, unfit
@@ -33,6 +35,7 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
         FileError: no clip can be used, or none is long enough to be held out.
     """
     found: list[tuple[str, Clip]] = []
+    same: dict[bytes, str] = {}  # names by motion
     if not folder.is_dir():
         raise FileError(
             f"there is no folder {folder}", "clips are looked for in a folder", "Name it with --data."
@@ -48,9 +51,14 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
         except InterposeError as error:
             progress(f"left out: {name} ({error.what}: {error.why})")
             continue
+        # A copy would be learned from and held out.
+        motion = np.abs(clip.rotation).round(4).tobytes()
         if reason := unfit(clip):
             progress(f"left out: {name} ({reason})")
+        elif motion in same:
+            progress(f"left out: {name} (the motion of {same[motion]} once more)")
         else:
+            same[motion] = name
             found.append((name, clip))
     if not found:
         raise FileError(

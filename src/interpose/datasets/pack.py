@@ -135,7 +135,7 @@ def assemble(dataset: str, chosen: Sequence[Part]) -> Pack:
     turned, roots = [np.zeros((0, len(JOINTS), 3), np.int16)], [np.zeros((0, 3), np.float32)]
     bones, bodies = [], []
     for part in chosen:
-        body = find_humanoid(part.clip, rests[part.performer])
+        body = find_humanoid(part.clip, rests[_rig(part)])
         turned.append(np.rint(rotations.log(body.rotations(part.clip)) / STEP).astype(np.int16))
         roots.append((body.root(part.clip) * body.scale).astype(np.float32))
         bones.append(body.bones * body.scale)
@@ -152,20 +152,22 @@ def assemble(dataset: str, chosen: Sequence[Part]) -> Pack:
     )
 
 
-def _rests(chosen: Sequence[Part]) -> Iterator[tuple[str, Rest]]:
-    """The T-pose of each performer's skeleton, from a sample of all clips of that performer."""
-    for performer in {part.performer for part in chosen}:
-        own = [part.clip for part in chosen if part.performer == performer]
-        first, total = own[0], sum(map(len, own))
-        alike = [
-            clip
-            for clip in own
-            if clip.skeleton.names == first.skeleton.names and clip.translated == first.translated
-        ]
-        step = max(1, total // POOL)
+Rig = tuple[str, tuple[str, ...], tuple[int, ...]]
+
+
+def _rig(part: Part) -> Rig:
+    """The performer and the joints of a clip: a performer may come on several skeletons."""
+    return part.performer, part.clip.skeleton.names, part.clip.translated
+
+
+def _rests(chosen: Sequence[Part]) -> Iterator[tuple[Rig, Rest]]:
+    """The T-pose of each performer's skeletons, from a sample of all clips of that performer on that one."""
+    for rig in {_rig(part) for part in chosen}:
+        own = [part.clip for part in chosen if _rig(part) == rig]
+        step = max(1, sum(map(len, own)) // POOL)
         pool = replace(
-            first,
-            rotation=np.concatenate([clip.rotation[::step] for clip in alike]),
-            translation=np.concatenate([clip.translation[::step] for clip in alike]),
+            own[0],
+            rotation=np.concatenate([clip.rotation[::step] for clip in own]),
+            translation=np.concatenate([clip.translation[::step] for clip in own]),
         )
-        yield performer, find_humanoid(pool).rest
+        yield rig, find_humanoid(pool).rest

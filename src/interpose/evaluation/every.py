@@ -59,12 +59,12 @@ def _joints(window: Window, *losses: tuple[Sequence[int], int, int]) -> Hidden:
     """Canonical joints whose rotations are unknown from one frame to before another; what hangs from them is
     measured."""
     mapping, gaps, moved = window.body.mapping, [], np.zeros((FRAMES, len(JOINTS)), bool)
-    for lost, start, stop in losses:
-        names = [
-            window.clip.skeleton.names[joint] for row in lost if (joint := mapping.joints[row]) is not None
-        ]
+    for rows, start, stop in losses:
+        # Of what the skeleton does not have nothing is hidden.
+        lost = {row: joint for row in rows if (joint := mapping.joints[row]) is not None}
+        names = [window.clip.skeleton.names[joint] for joint in lost.values()]
         gaps += [Gap(start, stop, tuple(names))] if names else []
-        below = set(lost)
+        below = {*lost}
         for joint, parent in enumerate(PARENTS):
             if parent in below:
                 below.add(joint)
@@ -80,9 +80,9 @@ def _place(window: Window, length: int) -> Hidden:
     return Hidden((0, FRAMES), seen, np.repeat(~seen.frames[:, None], len(JOINTS), axis=1))
 
 
-def _draw(rng: np.random.Generator, count: int) -> list[int]:
-    """So many joints other than the hips, each with something that hangs from it."""
-    inner = sorted({*PARENTS} - {-1, 0})
+def _draw(window: Window, rng: np.random.Generator, count: int) -> list[int]:
+    """So many joints that the skeleton has, other than the hips, each with something that hangs from it."""
+    inner = sorted({*PARENTS} & {*window.body.mapping.mapped[0]} - {0})
     return [int(joint) for joint in rng.permutation(inner)[:count]]
 
 
@@ -96,8 +96,8 @@ TASKS: dict[str, Callable[[Window, np.random.Generator], Hidden]] = {
     "1 s, five before, one after": lambda w, rng: _gap(w, 30, 5, 1),
     "1 s, ten before, one after": lambda w, rng: _gap(w, 30, 10, 1),
     "2 s between keys, one in the middle": lambda w, rng: _gap(w, 60, 1, 1, [30]),
-    "one joint lost": lambda w, rng: _joints(w, (_draw(rng, 1), 0, FRAMES)),
-    "three joints lost": lambda w, rng: _joints(w, (_draw(rng, 3), 0, FRAMES)),
+    "one joint lost": lambda w, rng: _joints(w, (_draw(w, rng, 1), 0, FRAMES)),
+    "three joints lost": lambda w, rng: _joints(w, (_draw(w, rng, 3), 0, FRAMES)),
     "an arm or a leg lost": lambda w, rng: _joints(w, (LIMBS[rng.integers(len(LIMBS))], 0, FRAMES)),
     "legs from the upper body": lambda w, rng: _joints(w, (LEGS, 0, FRAMES)),
     # Whatever the method, it is what the body stands on that tells it.
@@ -140,7 +140,7 @@ class Every:
         rows = []
         for task in self.errors:
             means = [self.mean(task, method) for method in self.methods]
-            best = min(value for value in means if value is not None)
+            best = min((value for value in means if value is not None), default=None)
             cells = ["-" if v is None else f"**{v:.2f}**" if v == best else f"{v:.2f}" for v in means]
             rows.append([task, *cells])
         return markdown(["", *self.methods], rows)
@@ -187,6 +187,7 @@ def run(
     result = Every(split, tuple(methods), len(held))
     for done, window in enumerate(held):
         for number, (task, hide) in enumerate(TASKS.items()):
+            own = result.errors[task]  # a row even where all refuse
             hidden = hide(window, np.random.default_rng((done, number)))
             clip, truth = window.clip.slice(*hidden.shown), window.positions[slice(*hidden.shown)]
             gaps = hidden.observation.gaps(clip.skeleton)
@@ -195,7 +196,7 @@ def run(
                     continue
                 filled = complete(clip, hidden.observation, method)
                 off = np.linalg.norm(window.canonical(filled.clip) - truth, axis=-1)
-                result.errors[task][name].append(100 * float(off[hidden.judged].mean()))
+                own[name].append(100 * float(off[hidden.judged].mean()))
                 if any(gap.method != method.name for gap in filled.report.gaps):
                     result.fell[task][name] += 1
         progress((done + 1) / len(held), f"{done + 1} of {len(held)} windows")

@@ -143,6 +143,12 @@ def cut(sequences: Sequence[Clip], length: int, step: int, bones: np.ndarray) ->
             turned.append(rotation[start : start + length])
             moved.append(clip.root[start : start + length])
             names.append(clip.name)
+    if not names:
+        raise RequestError(
+            "there is nothing to measure with",
+            f"no sequence has more than the {length} frames of a window",
+            "Unpack the whole data set there: docs/data.md.",
+        )
     rotation, root = np.array(turned), np.array(moved)
     root = root - root.mean(axis=1, keepdims=True) * [1.0, 0.0, 1.0]
     # The second local axis of the hips points ahead in this skeleton.

@@ -76,7 +76,13 @@ class Recipes:
     def __str__(self) -> str:
         seen = [run.name for run in self.runs if "validation" in run.settings.get("splits", "")]
         warning = f"\n\nTrained on these performers, too, so no measure: {', '.join(seen)}." * bool(seen)
-        return f"Validation performers, at the end of each run.\n\n{self.table()}{warning}"
+        early = [
+            f"{run.name} ({100 * done:.0f} %)"
+            for run in self.runs
+            if (done := run.last.get("fraction", 1)) < 1
+        ]
+        warning += f"\n\nNot at the end of their budget yet: {', '.join(early)}." * bool(early)
+        return f"Validation performers, as each run was measured last.\n\n{self.table()}{warning}"
 
 
 def compare(folders: Sequence[Path], figures: Sequence[str] = ()) -> Recipes:

@@ -64,7 +64,7 @@ def crossing(spline: list[float], network: list[float]) -> int:
     """The shortest length of GAPS from which on the network's error is below the spline's at every length."""
     from_gap = GAPS[-1] + 1
     for gap, theirs, ours in reversed(list(zip(GAPS, spline, network))):
-        if ours >= theirs:
+        if not ours < theirs:
             break
         from_gap = gap
     return from_gap

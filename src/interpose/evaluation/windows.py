@@ -79,11 +79,15 @@ def windows(
         length, step: frames.
         most: windows per data set, spread evenly over all of them; None for all.
         by_label: so many of each label instead.
+
+    Raises:
+        RequestError: an unknown split, or none of its clips is as long.
     """
     if split not in SPLITS:
         raise RequestError(
             f"unknown split: {split}", f"it is none of: {', '.join(SPLITS)}", "Choose one of these."
         )
+    there = False
     for dataset in datasets:
         entries = clips(dataset, data, split)
         progress(f"{dataset}: reading {len(entries)} clips")
@@ -108,4 +112,11 @@ def windows(
                 label, clip, start = some[i]
                 cut = clip.slice(start, start + length)
                 body = find_humanoid(cut)
+                there = True
                 yield Window(dataset, cut, body, body.positions(cut), label)
+    if not there:
+        raise RequestError(
+            "there is nothing to measure with",
+            f"{data} holds no clip of {length / 30:g} s of a {split} performer ({', '.join(datasets)})",
+            "Unpack the whole data sets there: docs/data.md.",
+        )

@@ -83,7 +83,7 @@ def load(
             )
     _check_readable(path)
     if skeleton is not None:
-        _check_readable(Path(skeleton))
+        _check_readable(_path(skeleton, "skeleton"))
     try:
         return chosen.read(path, **options)
     except OSError as error:
@@ -155,9 +155,9 @@ def _alone(path: Path) -> tuple[str, ...]:
     return ()
 
 
-def _path(path: object) -> Path:
+def _path(path: object, name: str = "path") -> Path:
     if not isinstance(path, str | os.PathLike):
-        raise unfit("path", path, "the path of a file")
+        raise unfit(name, path, "the path of a file")
     return Path(path)
 
 

@@ -125,6 +125,20 @@ def estimate_unit(mapping: Mapping, clip: Clip) -> tuple[float, str]:
     return UNITS["cm"], "assumed, no legs found"
 
 
+def missized(clip: Clip, unit: float) -> tuple[str, ...]:
+    """A note where a new file of the clip, with so many metres a unit, would be taken for one of another
+    unit, as those of small children and of giants."""
+    if not len(clip):
+        return ()
+    seen = clip.take(np.array(sample_frames(len(clip)))).scaled(1 / unit)
+    found = estimate_unit(find_mapping(seen.skeleton), seen)[0]
+    if np.isclose(found, unit):
+        return ()
+    said = next((name for name, size in UNITS.items() if np.isclose(size, unit)), f"{unit:.6g}")
+    times = f"{found / unit:.2g} times its size"
+    return (f"read again, it may be taken for {times}: --unit={said} (unit= in Python) says it",)
+
+
 def misread(clip: Clip, up: str, how: str = "") -> tuple[str, ...]:
     """A note where a file of the clip, in which `up` is the axis that points up, would be taken for one with
     another axis up, as a few seconds of a body that lies may be; none where that was given for it (`how`)."""

@@ -8,9 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from interpose.errors import FileError
+from interpose.errors import FileError, is_number
 from interpose.formats.asf_amc.asf import Asf
 from interpose.formats.text import NUMBER, VALUE_LIMIT, FrameText, line_of, nth_words, number
+from interpose.geometry.time import FASTEST, SLOWEST
 
 FILE_LIMIT = 512 << 20  # bytes: more than an hour at 120 frames a second
 _COMMENT = re.compile(rb"(?<![^\s,()])#[^\r\n]*")
@@ -155,7 +156,7 @@ def _read_header(text: bytes, what: str) -> tuple[AmcHeader, int]:
         elif key == ":samples-per-second":
             word = words[1].decode("latin-1") if len(words) > 1 else ""
             fps = number(word)
-            if fps is None or not fps > 0.001:
+            if not is_number(fps, SLOWEST, FASTEST):
                 why = f"{line}the frame rate is {word[:40]!r}"
                 raise FileError(what, why, "Write for example :SAMPLES-PER-SECOND 120")
             begin = text.index(words[1], match.start() + len(words[0]))

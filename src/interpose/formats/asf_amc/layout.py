@@ -142,9 +142,14 @@ class Layout:
         return new, np.linalg.norm(off, axis=-1) * self.unit
 
 
+def bone_ends(asf: Asf) -> np.ndarray:
+    """(J, 3) in file units and axes: from the start of each bone to its end in the rest pose."""
+    return np.array([_direction(bone) * bone.length for bone in asf.bones])
+
+
 def bone_vectors(asf: Asf) -> np.ndarray:
     """(J, 3) in file units and axes: from the start of each joint's parent to its own in the rest pose."""
-    ends = np.array([_direction(bone) * bone.length for bone in asf.bones])
+    ends = bone_ends(asf)
     rest = np.array([ends[bone.parent] if bone.parent >= 0 else np.zeros(3) for bone in asf.bones])
     rest[0] = asf.position
     return rest

@@ -10,12 +10,12 @@ import numpy as np
 
 from interpose import skeletons
 from interpose.clip import Clip, Skeleton
-from interpose.errors import RequestError
 from interpose.formats import place
 from interpose.formats.asf_amc.amc_text import AmcHeader, read_amc
 from interpose.formats.asf_amc.asf import Asf, find_asf, read_asf
-from interpose.formats.asf_amc.layout import Layout, bone_vectors, make_layout
+from interpose.formats.asf_amc.layout import Layout, bone_ends, bone_vectors, make_layout
 from interpose.formats.changes import TextSource
+from interpose.geometry.time import check_rate
 from interpose.skeletons import find_mapping
 
 FPS = 120.0  # of CMU and HDM05, and of most that is published in this form
@@ -51,6 +51,10 @@ class AmcSource(TextSource):
     def up(self) -> str:
         """The files' up axis, "y", "z", ..."""
         return self.layout.up
+
+    def ends(self) -> np.ndarray:
+        """(J, 3) metres, Y up: from each joint to the end of its bone in the rest pose."""
+        return place.vectors_inside(bone_ends(self.asf), self.unit, self.up)
 
     def describe(self) -> tuple[str, ...]:
         """What was found out about the files, one line each, for printing."""
@@ -89,8 +93,8 @@ def read(
         RequestError: an option is wrong.
     """
     scale, axis = place.given_unit(unit), place.given_up(up)
-    if fps is not None and not (np.isfinite(fps) and fps > 0):
-        raise RequestError(f"the frame rate {fps} is impossible", "it is frames a second", "Write 120.")
+    if fps is not None:
+        check_rate(fps)
     asf = read_asf(Path(skeleton) if skeleton is not None else find_asf(path))
     header, motion, columns = read_amc(path, asf)
     raw = make_layout(asf, columns, asf.degrees if header.degrees is None else header.degrees)

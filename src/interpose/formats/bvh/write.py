@@ -9,6 +9,7 @@ import numpy as np
 from interpose.clip import Clip
 from interpose.errors import RequestError
 from interpose.formats import angles, place
+from interpose.formats.asf_amc.read import AmcSource
 from interpose.formats.bvh.header import Header
 from interpose.formats.bvh.read import BvhSource
 from interpose.formats.changes import Lost, check_values, same_skeleton, translation_of, write_frames
@@ -25,6 +26,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     A clip that was read from BVH and still has that skeleton keeps header and layout, and every number that
     did not change keeps its text: the clip's values are compared with those read, bit for bit. Any other clip
     gets a new header: centimetres, Y up, rotation order ZXY, six channels for roots and translated joints.
+    Where it was read from AMC, End Sites are where its bones end.
 
     Raises RequestError for joint names that BVH cannot hold.
     """
@@ -32,7 +34,7 @@ def write(clip: Clip, stream: BinaryIO) -> tuple[str, ...]:
     if isinstance(source, BvhSource) and same_skeleton(clip.skeleton, source.skeleton):
         return _write_changes(clip, source, stream)
     _write_new(clip, stream)
-    return place.misread(clip, "y")
+    return (*place.missized(clip, CENTIMETRE), *place.misread(clip, "y"))
 
 
 # Changes to the text of a file --------------------------------------------------------------------------
@@ -116,6 +118,9 @@ def _write_new(clip: Clip, stream: BinaryIO) -> None:
             "Rename it, or write .npz.",
         )
     offsets = skeleton.rest_translation * skeleton.scale_above[:, None] / CENTIMETRE
+    source, ends = clip.source, np.zeros_like(offsets)
+    if isinstance(source, AmcSource) and same_skeleton(skeleton, source.skeleton):
+        ends = source.ends() / CENTIMETRE
     bones = np.round(offsets[[parent >= 0 for parent in skeleton.parents]], DECIMALS)
     check_values(bones)
     if bones.size and not bones.any():
@@ -151,7 +156,7 @@ def _write_new(clip: Clip, stream: BinaryIO) -> None:
         below = skeleton.children[joint]
         waiting.extend(reversed(below))
         if not below:
-            lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {_numbers(np.zeros(3))}"]
+            lines += [f"{indent}\tEnd Site", f"{indent}\t{{", f"{indent}\t\tOFFSET {_numbers(ends[joint])}"]
             lines += [f"{indent}\t}}"]
     close(0)
     lines += ["MOTION", f"Frames: {len(clip)}", f"Frame Time: {1 / clip.fps:.8f}", ""]
