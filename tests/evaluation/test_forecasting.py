@@ -216,5 +216,5 @@ def test_data_and_weights_that_are_not_there(published, tmp_path, monkeypatch):
     with pytest.raises(FileError, match="no weights that forecast"):
         forecasters.load([tmp_path])
     monkeypatch.setattr(forecasters, "AHEAD", 10_000)
-    with pytest.raises(RequestError, match="nothing to forecast"):
+    with pytest.raises(RequestError, match="nothing to measure with"):
         forecasters.read(published, "validation")
