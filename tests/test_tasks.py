@@ -19,6 +19,7 @@ from tests.skeletons.rigs import twice, under_root
 from interpose import tasks
 from interpose.clip import Clip, Skeleton
 from interpose.errors import RequestError
+from interpose.evaluation.denoising import tremble
 from interpose.finish import Provenance, complete, feet, retarget
 from interpose.finish.report import GapReport
 from interpose.formats import load
@@ -1101,3 +1102,32 @@ def test_a_forecast_does_not_start_from_a_rest_pose_that_ends_a_file(cmu_walk):
     np.testing.assert_allclose(done.clip.positions(), whole.clip.positions(), atol=1e-6)
     assert (done.start, len(done.clip)) == (last, last + 31)
     assert any(f"frame {last} is no part of the motion" in note for note in done.report.gaps[0].notes)
+
+
+def test_a_forecast_makes_the_last_frame_anew_of_whom_it_does_not_belong_to(duo):
+    """One of two bodies ends in its rest pose: the other one's frame stays as it is."""
+    count, last = len(duo.skeleton) // 2, len(duo) - 1
+    rotation = duo.rotation.copy()
+    rotation[last, count:] = duo.skeleton.rest_rotation[count:]
+    odd = duo.with_motion(rotation, duo.translation)
+    done = tasks.forecast(odd, 30, method="small")
+    assert np.array_equal(done.clip.rotation[: last + 1, :count], odd.rotation[:, :count])
+    assert np.array_equal(done.clip.translation[: last + 1, 0], odd.translation[:, 0])
+    off = rotations.angle(done.clip.rotation[last, count:], duo.rotation[last, count:])
+    assert off.mean() < 0.2 * rotations.angle(rotation[last, count:], duo.rotation[last, count:]).mean()
+    (note,) = {note for gap in done.report.gaps for note in gap.notes if "made anew" in note}
+    assert note.startswith(f"frame {last} of B_Hips")
+    rotation[last] = duo.skeleton.rest_rotation
+    both = tasks.forecast(duo.with_motion(rotation, duo.translation), 30, method="small")
+    assert both.start == last
+
+
+def test_of_two_bodies_the_one_that_is_meant_is_denoised(duo):
+    meant = replace(duo, skeleton=replace(duo.skeleton, roles={"root": "B_Hips"}), source=None)
+    count = len(duo.skeleton) // 2
+    noisy = tremble(meant, 2.0, np.random.default_rng(0))
+    done = tasks.denoise(noisy)
+    assert np.array_equal(done.clip.rotation[:, :count], noisy.rotation[:, :count])
+    assert not np.array_equal(done.clip.rotation[:, count:], noisy.rotation[:, count:])
+    with pytest.raises(RequestError, match="cannot denoise LeftArm"):
+        tasks.denoise(noisy, joints=["LeftArm", "B_LeftArm"])

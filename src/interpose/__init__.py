@@ -373,7 +373,8 @@ def forecast(
     temperature: float = 1.0,
     progress: Callable[[float], None] | None = None,
 ) -> Forecast:
-    """Go on with a clip, from its last pose and where that is; the clip itself comes back unchanged.
+    """Go on with a clip, from its last pose and where that is. The clip comes back unchanged, but for a
+    last frame that is no part of the motion, as a rest pose: it is made anew, and a note says so.
 
     Args:
         clip: a clip, or the path of one. Two seconds of it or more tell best how it goes on.

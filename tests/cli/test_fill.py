@@ -510,6 +510,25 @@ def test_an_arm_of_another_clip_in_a_gap_and_its_report_replayed(run, take, data
     )
 
 
+@pytest.mark.parametrize("gap", ["60:90", "60:110", "40:90"])
+def test_an_arm_of_another_clip_beside_known_frames_is_replayed(run, take, data, gap):
+    """Led on from these it leaves gaps before the frames that it gives, and after them."""
+    take.with_name("jump.bvh").write_bytes((data / "cmu_jump.bvh").read_bytes())
+    words = ["--gap", gap, "--joints", "RightArm,RightForeArm,RightHand", "--method", "spline"]
+    part = ["--from", "jump.bvh", "--from-range", "40:70", "--at", "60"]
+    assert run("fill", "take.bvh", *words, *part).code == 0
+    assert run("fill", "take.bvh", "--gaps", "take.filled.json", "-o", "again.bvh").code == 0
+    assert take.with_name("again.bvh").read_bytes() == take.with_name("take.filled.bvh").read_bytes()
+
+
+def test_the_report_of_an_amc_has_the_checksum_of_its_skeleton(run, take, data):
+    for name in ("cmu_02_03.amc", "cmu_02.asf"):
+        shutil.copy(data / name, take.with_name(name))
+    report = run("fill", "cmu_02_03.amc", "--gap", "60:70", "--skeleton", "cmu_02.asf", "--json").json
+    assert report["skeleton_sha256"] == hashlib.sha256((data / "cmu_02.asf").read_bytes()).hexdigest()
+    assert report["input_sha256"] == hashlib.sha256((data / "cmu_02_03.amc").read_bytes()).hexdigest()
+
+
 def test_a_path_is_in_the_file_s_own_unit_and_its_report_is_replayed(run, take):
     clip = load(take)
     unit = clip.source.unit

@@ -131,6 +131,23 @@ def test_an_arm_that_whips_back_is_seen_among_frames_that_jitter(cmu_walk):
     assert abs(frame - 130) <= 4
 
 
+def test_a_whip_is_not_blamed_on_what_jitters_from_frame_to_frame(cmu_walk):
+    """Over as many frames as the hand takes to whip the elbow, which is known, hardly jumps."""
+    clip = interpose.resample(cmu_walk, 120)
+    known = Observation.from_gaps(clip, [Gap(100, 160, ("LeftForeArm", "LeftHand"))])
+    jitter = np.random.default_rng(0).normal(scale=0.0005, size=clip.translation.shape)
+    elbow, away = clip.skeleton.index("LeftForeArm"), np.abs(np.arange(len(clip)) - 130)
+    rotation = clip.rotation.copy()
+    bent = rotations.about("Y", np.clip((5 - away) / 3, 0, 1))
+    rotation[:, elbow] = rotations.multiply(rotation[:, elbow], bent)
+    whips = clip.with_motion(rotation, clip.translation + jitter)
+    bounds = jumps.Bounds.of(whips, known, seams.limits(whips, known))
+    ((excess, words, _),) = jumps.whips(whips, known, Span(100, 160, "any"), bounds, 0)
+    assert excess > jumps.SLACK
+    assert "LeftHand" in words or "Index" in words or "Thumb" in words
+    assert "hangs" not in words
+
+
 def test_what_jumps_as_what_carries_it_is_not_blamed_for_it(cmu_walk):
     """A knee that is lost while the hip, which is known, jumps by 30 cm and back."""
     translation = cmu_walk.translation.copy()

@@ -166,6 +166,18 @@ def test_a_part_of_a_mirror_image_points_as_its_original_does(cmu_walk):
     assert np.abs(there - laid(cmu_walk, other)).max() < 1e-6
 
 
+def test_two_parts_give_no_joint_twice_and_lie_in_any_order(cmu_walk, data):
+    """Also where the one begins with frames that lead on from what is known."""
+    jump, gap = interpose.load(data / "cmu_jump.bvh"), [Gap(85, 145, ARM)]
+    two = [Part(jump, 40, 70, 85, ARM), Part(jump, 0, 6, 85, ARM)]
+    for parts in (two, two[::-1]):
+        with pytest.raises(interpose.RequestError, match="two poses of Right"):
+            interpose.fill(cmu_walk, gap, parts=parts)
+    two = [Part(jump, 40, 70, 85, ARM), Part(jump, 10, 30, 115, ARM)]
+    one, other = (interpose.fill(cmu_walk, gap, parts=parts).clip for parts in (two, two[::-1]))
+    assert np.array_equal(one.rotation, other.rotation)
+
+
 def test_a_part_beside_known_frames_is_led_to_and_from(cmu_walk, data):
     """As long as the gap it is laid in, it would pop at both ends, and no gap would be left to tell of it."""
     jump, hand = interpose.load(data / "cmu_jump.bvh"), cmu_walk.skeleton.index("RightHand")

@@ -50,7 +50,8 @@ def forecast(
 ) -> int:
     """Continue a clip: frames are added after its last one.
 
-    The clip itself comes back unchanged. Writes take.forecast.bvh and
+    The clip itself comes back unchanged, except a last frame that is not part of
+    the motion, such as a rest pose. Writes take.forecast.bvh and
     take.forecast.json; with several samples take.forecast.1.bvh, take.forecast.2.bvh
     and so on, and one report.
 

@@ -184,6 +184,7 @@ def to_json(
         "input_sha256": _checksum(file),
         "output": str(output),
         **details(clip),
+        **({"skeleton_sha256": _checksum(clip.source.asf.path)} if hasattr(clip.source, "asf") else {}),
         "method": report["method"],
         **({"action": report["action"]} if report["action"] else {}),
         "seed": seed,
@@ -207,7 +208,8 @@ def to_json(
 
 def others_read(files: Iterable[Path], file: Path) -> dict[str, Any]:
     """What a report says of the files that were read beside its input: the checksum of each."""
-    others = {str(one): _checksum(one) for one in dict.fromkeys(files) if one != file}
+    named = {one.resolve(): one for one in (file, *files)}  # each once, however it is spelled
+    others = {str(one): _checksum(one) for path, one in named.items() if path != file.resolve()}
     return {"others_sha256": others} if others else {}
 
 

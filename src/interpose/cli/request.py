@@ -401,7 +401,8 @@ def _replay(path: Path, filled: list[Gap], content: dict[str, Any], clip: Clip, 
         filled += [Gap(p.at, p.at + p.stop - p.start, p.joints) for p in (one.part for one in parts)]
     else:
         # The report of a gap with parts lists their frames by themselves, without the joints that they gave.
-        holed = [gap for gap in filled if any(gap.start <= one.part.at < gap.stop for one in parts)]
+        spans = [(p.at, p.at + p.stop - p.start) for p in (one.part for one in parts)]
+        holed = [gap for gap in filled if any(gap.start < stop and start < gap.stop for start, stop in spans)]
         filled = [gap if gap not in holed else Gap(gap.start, gap.stop) for gap in filled]
     return Request(
         [*filled, *open_gaps],

@@ -26,18 +26,22 @@ EXACT = 1e-4  # radians about other axes that stay: files have a few digits
 LOOKED_AT = 1000  # frames, spread over the clip
 
 
+# Of joints that turn about one axis their rotation (4,) at some time, and the axis, a unit vector (3,) in the
+# axes of the parent.
+Single = dict[int, tuple[np.ndarray, np.ndarray]]
+
+
 @dataclass(frozen=True)
 class Axes:
     """The joints of a clip that turn about fewer than three axes.
 
     Attributes:
         source: that of the clip as it was read, see `formats.axes`.
-        single: of joints that are seen to turn about one axis their rotation (4,) at some time, and the axis,
-            a unit vector (3,) in the axes of the parent.
+        single: those that are seen to turn about one.
     """
 
     source: Any
-    single: dict[int, tuple[np.ndarray, np.ndarray]]
+    single: Single
 
     @classmethod
     def said(cls, source: Any) -> Axes:

@@ -17,6 +17,7 @@ from interpose.finish import feet, pins
 from interpose.finish.aiming import aimed, severed
 from interpose.finish.gap_report import same
 from interpose.finish.guarantees import STEPPED, STEPS, Ask, guaranteed
+from interpose.finish.habits import Habits
 from interpose.finish.loose import MOST, Layer, loose, without
 from interpose.finish.notes import TURNS
 from interpose.finish.opinion import certain, wipe
@@ -50,8 +51,7 @@ def complete(
     method: Method,
     seed: int | None = None,
     fallback: Method | None = None,
-    limits: np.ndarray | None = None,
-    still: np.ndarray | None = None,
+    habits: Habits | None = None,
     path: Mapping[int, np.ndarray] | None = None,
     first: int = 0,
 ) -> Completion:
@@ -67,9 +67,7 @@ def complete(
         method: what completes it.
         seed: for methods that sample.
         fallback: the simpler method.
-        limits: (J,) metres per frame squared, the largest velocity jumps allowed at a seam, when `clip` is a
-            window of a longer one. Default: the clip's own, see `seams.limits`.
-        still: (J,) joints that never turn, likewise. Default: see `anatomy.still`.
+        habits: how its bodies move, when it is a window of a longer one. Default: as the clip tells.
         path: x and z in metres that the hips are to be over, by frame; inside of gaps of the whole pose.
         first: the number by which notes call the first frame, when `clip` is a window of a longer one.
 
@@ -78,7 +76,7 @@ def complete(
             point of the path lies in no gap of the whole pose with known frames on both sides.
     """
     observation.check(clip)
-    ask = Ask(method, seed, fallback or Spline(), limits, still, first)
+    ask = Ask(method, seed, fallback or Spline(), habits, first)
     if several := performers(clip.skeleton):
         return _each(several, clip, observation, ask, path)
     return _complete(clip, observation, ask, path)
@@ -99,8 +97,8 @@ def _each(
         seen = Observation(observation.rotation[:, own], observation.translation[:, own], pins)
         if seen.complete and not pins:
             continue
-        limits, still = (None if some is None else some[own] for some in (ask.limits, ask.still))
-        done[joints] = _complete(part, seen, replace(ask, limits=limits, still=still), path)
+        habits = None if ask.habits is None else ask.habits.some(joints)
+        done[joints] = _complete(part, seen, replace(ask, habits=habits), path)
         path = None
     return assembled(clip, done) if done else _complete(clip, observation, ask, path)
 

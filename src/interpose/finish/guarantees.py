@@ -28,6 +28,7 @@ from interpose.finish import (
 from interpose.finish.axes import Axes
 from interpose.finish.calming import calmed
 from interpose.finish.gap_report import gap_report, provenance, slides
+from interpose.finish.habits import Habits
 from interpose.finish.loose import Layer
 from interpose.finish.opinion import as_rotations, carried, certain, merge, refusal, said, second
 from interpose.finish.report import Completion, Report
@@ -72,8 +73,7 @@ class Ask:
     method: Method
     seed: int | None
     fallback: Method
-    limits: np.ndarray | None
-    still: np.ndarray | None
+    habits: Habits | None
     first: int
 
 
@@ -114,7 +114,7 @@ class _Work:
         bounds: how far velocities may jump; None where nothing is known to compare with.
         before: the velocity jump beside each gap as the method left it, see `jumps.beside`.
         unheld: slide and travel of the feet in each gap before they are held.
-        axes: of joints that turn about fewer than three; `still` (J,) those that never turn.
+        habits: how the body moves; `axes`, of joints that turn about fewer than three, as far as they hold.
         simpler: what the simpler method said, where it was asked.
         mended, stepped: the frames of spans over which a spline leads, and what is to be said of spans that
             were given steps, by their first frames and whether in the method's own motion.
@@ -127,9 +127,9 @@ class _Work:
         self.known = self.firm = certain(hidden, observation)
         self.gaps = self.known.gaps(clip.skeleton)
         self.spans = [Span(start, stop, ask.method.name) for start, stop in runs(~self.known.frames)]
-        self.still = anatomy.still(hidden, self.known) if ask.still is None else ask.still
-        # Pins ask for what a body does not do by itself, and their files hold it.
-        self.axes = Axes.said(clip.source) if self.layer else Axes.of(hidden, self.known, clip.source)
+        self.habits = Habits.of(hidden, self.known) if ask.habits is None else ask.habits
+        # Pins and paths ask for what a body does not do by itself, and their files hold it.
+        self.axes = Axes(clip.source, {} if self.layer else self.habits.single)
         self.simpler: Raw | None = None
         self.unheld: dict[Gap, tuple[float, float]] = {}
         self.mended: dict[tuple[int, bool], list[tuple[int, int]]] = {}
@@ -148,8 +148,8 @@ class _Work:
             self.raw = said(ask.method, hidden, self.observation, ask.seed)
         self.opinion, self.error = self._hear(self.raw)
         self.current = merge(self.opinion, hidden, known)
-        limits = seams.limits(self.bare, known) if ask.limits is None else ask.limits
-        self.bounds = None if limits is None else jumps.Bounds.of(self.bare, known, limits)
+        limits = self.habits.limits
+        self.bounds = None if np.isnan(limits).any() else jumps.Bounds.of(self.bare, known, limits)
         self.before = {gap: jumps.beside(self.current, known, gap, self.bounds) for gap in self.gaps}
 
     def _hear(self, raw: Raw) -> tuple[Clip, np.ndarray | None]:
@@ -157,7 +157,7 @@ class _Work:
         joints stay `firm` in it."""
         hidden, known = self.hidden, self.known
         rotations_said = not self.layer and raw.positions is None
-        self.firm = anatomy.locked(known, self.still) if rotations_said else known
+        self.firm = anatomy.locked(known, self.habits.still) if rotations_said else known
         opinion, error = as_rotations(raw, known, self.spans)
         if not self.layer:
             opinion = carried(opinion, hidden, known)

@@ -185,15 +185,16 @@ def excesses(
     return found
 
 
-def _carried(current: Clip, known: Observation, joint: int, frame: int) -> str:
-    """Of a jump of a joint that hangs from one whose place is known what that is to blame for, in words."""
-    near, skeleton = slice(frame - 1, frame + 2), current.skeleton
+def _carried(current: Clip, known: Observation, joint: int, frame: int, step: int) -> str:
+    """Of a jump of a joint over `step` frames, which hangs from one whose place is known, what that is to
+    blame for, in words."""
+    near, skeleton = slice(frame - step, frame + step + 1), current.skeleton
     told = np.atleast_1d(known.slice(near.start, near.stop).positions(skeleton).all(axis=0))
     above = next((one for one in skeleton.ancestors(joint) if told[one]), None)
     if above is None:
         return ""
     placed = current.slice(near.start, near.stop).positions()
-    own, its = (float(measures.acceleration(placed[:, one])[0]) for one in (joint, above))
+    own, its = (float(measures.acceleration(placed[:, one], step)[0]) / step**2 for one in (joint, above))
     if its < CARRIES * own:
         return ""
     name = skeleton.names[above]
@@ -215,7 +216,7 @@ def whips(
     size = np.linalg.norm(seams.jumps(current, known, frames, step), axis=-1) / step**2
     where = f"inside the gap, over {step} frames"
     most = np.array(bounds.beat / step**2)
-    return [_worst(size, most, frames, current, known, where, first)]
+    return [_worst(size, most, frames, current, known, where, first, step)]
 
 
 def _worst(
@@ -226,14 +227,16 @@ def _worst(
     known: Observation,
     where: str,
     first: int,
+    step: int = 1,
 ) -> tuple[float, str, int]:
-    """An entry of `excesses`: of jumps (n, J) at some frames the one furthest beyond what it may be."""
+    """An entry of `excesses`: of jumps (n, J) over `step` frames at some the one furthest beyond what it may
+    be."""
     most = np.broadcast_to(most, size.shape)
     row, joint = np.unravel_index((size / most).argmax(), size.shape)
     own, limit, frame = float(size[row, joint]), float(most[row, joint]), int(frames[row])
     words = f"the velocity jumps by {100 * own:.2f} cm/frame^2 {where}, above {100 * limit:.2f}"
     words += f" ({clip.skeleton.names[joint]}, frame {first + frame})"
-    return own / limit, words + _carried(clip, known, int(joint), frame), frame
+    return own / limit, words + _carried(clip, known, int(joint), frame, step), frame
 
 
 def mend(current: Clip, known: Observation, span: Span, bounds: Bounds | None) -> list[tuple[int, int]]:

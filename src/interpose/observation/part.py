@@ -65,14 +65,17 @@ def lay(clip: Clip, observation: Observation, parts: Iterable[Part]) -> tuple[Cl
             rate, or joints that rest differently.
     """
     rotation, known = clip.rotation.copy(), observation.rotation.copy()
-    for part in parts:
+    given = np.zeros_like(known)
+    # Of two that adjoin the later one leads on from the other, in whatever order they are named.
+    for part in sorted(parts, key=lambda part: part.at):
         _check(clip, observation, part)
         to = slice(part.at, part.at + part.stop - part.start)
         for name in part.joints:
             here, there = clip.skeleton.index(name), part.clip.skeleton.index(name)
-            if (known[to, here] > observation.rotation[to, here]).any():
+            if given[to, here].any():
                 why = f"two parts give it in the frames {to.start}:{to.stop}, or in some of them"
                 raise RequestError(f"there are two poses of {name}", why, "Give one of them.")
+            given[to, here] = True
             rotation[to, here] = part.clip.rotation[part.start : part.stop, there]
             known[_apart(part, known[:, here], clip.fps), here] = True
         _hung(rotation, clip, observation, part)

@@ -40,7 +40,7 @@ def denoise(
     seed: int | None = None,
 ) -> Completion:
     """Smooth noise, and fill values that were lost, over the whole clip or over frames start to stop - 1; of
-    several bodies each as if it were alone.
+    several bodies each as if it were alone, or the one that somebody said is meant (`roles["root"]`).
 
     Args:
         clip: what is observed but not fully trusted.
@@ -67,6 +67,14 @@ def denoise(
     chosen = None if joints is None else [clip.skeleton.index(name) for name in joints]
     if several := meant(clip.skeleton):
         bodies: dict[Joints, Completion] = {}
+        held = {clip.skeleton.names[joint] for body in several for joint in body}
+        if strange := [name for name in joints or () if name not in held]:
+            root = clip.skeleton.roles["root"]
+            raise RequestError(
+                f"cannot denoise {few(strange)}",
+                f"the body of {root} is meant, and that is of another one",
+                "Leave it out, or leave out what is said of the root.",
+            )
         for body in several:
             own = clip_of(clip, body)
             some = None if joints is None else [name for name in joints if name in own.skeleton.names]

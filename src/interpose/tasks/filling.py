@@ -11,7 +11,8 @@ import numpy as np
 
 from interpose.clip import Clip
 from interpose.errors import RequestError
-from interpose.finish import Completion, GapReport, Provenance, Report, anatomy, complete, on_rig_of, seams
+from interpose.finish import Completion, GapReport, Provenance, Report, complete, on_rig_of
+from interpose.finish.habits import Habits
 from interpose.finish.path import spans
 from interpose.finish.retargeting import common
 from interpose.methods import auto, registry
@@ -21,7 +22,6 @@ from interpose.observation.observation import frame_number, longest
 from interpose.observation.part import lay, misfits
 from interpose.resampling import resample
 from interpose.skeletons import find_humanoid
-from interpose.skeletons.performers import clip_of, performers
 from interpose.skeletons.targets import following, seated
 from interpose.tasks.moments import mended, momentary, with_moments
 from interpose.tasks.planning import Job, plan, seed_of
@@ -103,7 +103,7 @@ def fill(
     jobs = plan(clip, observation, method, max_gap, only, methods or {}, action, temperature, zero)
     _check_open(jobs, points)
     # Of all of the take: a window of it tells less of how it moves.
-    limits, still = _habits(clip, observation) if any(job.method for job in jobs) else (None, None)
+    habits = Habits.of(clip, observation) if any(job.method for job in jobs) else None
     work = [(group, one) for group in together(jobs, clip, observation) for one in group.methods]
     for done, (group, chosen) in enumerate(work):
         pieces = [piece for piece in group.pieces if piece.job.method == chosen]
@@ -113,7 +113,7 @@ def fill(
         other = auto.instead(chosen, window, Gap(pieces[0].start - lo, pieces[-1].stop - lo))
         led = {frame for piece in pieces for frame in range(piece.start, piece.stop)}
         way = {frame - lo: point for frame, point in points.items() if frame in led}
-        part = complete(window, seen, chosen, seed, other, limits, still, path=way, first=lo - zero)
+        part = complete(window, seen, chosen, seed, other, habits, path=way, first=lo - zero)
         whole.take(part, pieces, lo)
         if progress:
             progress((done + 1) / len(work))
@@ -125,22 +125,6 @@ def fill(
             going[gap.start : gap.stop] = False
         return _with_targets(filled, observation, going)
     return with_moments(filled, clip, brief) if brief else filled
-
-
-def _habits(clip: Clip, observation: Observation) -> tuple[np.ndarray | None, np.ndarray]:
-    """How far velocities of joints jump at seams, and which never turn, as `complete` takes them: of several
-    bodies by what is known of each."""
-    limits, still = seams.limits(clip, observation), anatomy.still(clip, observation)
-    for joints in performers(clip.skeleton):
-        own = list(joints)
-        body = (
-            clip_of(clip, joints),
-            Observation(observation.rotation[:, own], observation.translation[:, own]),
-        )
-        still[own] = anatomy.still(*body)
-        if limits is not None and (most := seams.limits(*body)) is not None:
-            limits[own] = most
-    return limits, still
 
 
 def _known(observation: Observation) -> tuple[np.ndarray, np.ndarray]:

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from interpose.clip import Clip
-from interpose.errors import RequestError, is_number
+from interpose.errors import RequestError, few, is_number
 from interpose.finish import Completion
 from interpose.finish.opinion import refusal
 from interpose.methods import registry
 from interpose.methods.protocol import Method, Sampler
 from interpose.observation import Gap, Observation, timeline
 from interpose.observation.scan import strays
+from interpose.skeletons.performers import clip_of, meant
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import plan, seed_of
 
@@ -29,7 +30,7 @@ class Forecast(Completion):
     """A clip and what follows, and other ways in which it may go on.
 
     Attributes:
-        start: the first frame that was not there.
+        start: the first frame that is new: a last one that was no part of the motion and is made anew, too.
         samples: all of them, this one first.
     """
 
@@ -87,11 +88,12 @@ def forecast(
     if not len(clip):
         raise RequestError("there is nothing to go on from", "the clip has no frame", "Name another clip.")
     longer = clip.take(np.minimum(np.arange(len(clip) + frames), len(clip) - 1))
-    last, odd = len(clip), {*strays(clip)}
-    while last - 1 in odd:
-        last -= 1
-    gap = Gap(last, len(longer))
+    odd, last = _astray(clip), len(clip)
+    every = odd == [None]
+    gap = Gap(last - every, len(longer))
     seen = Observation.without(longer, [gap])
+    own = Observation.from_gaps(longer, [Gap(last - 1, last, names) for names in odd if names])
+    seen = Observation(seen.rotation & own.rotation, seen.translation & own.translation)
     job = plan(longer, seen, method, None, None, {})[0]
     chosen = job.method if method == "auto" and job.method else method
     name = registry.name_of(chosen)
@@ -121,9 +123,9 @@ def forecast(
         done.append(one)
     # Why it is no network's, which this was to be.
     notes = [job.note] if job.note else []
-    if last < len(clip):
-        which = f"frame {last} is" if last + 1 == len(clip) else f"frames {last} to {len(clip) - 1} are"
-        notes.append(f"{which} no part of the motion, and made anew")
+    for names in odd:
+        whose = f" of {few(list(names))}" if names else ""
+        notes.append(f"frame {last - 1}{whose} is no part of the motion, and made anew")
     for said in notes:
         done = [_noted(one, said) for one in done]
     # The report tells what was asked for; its gap, what did it.
@@ -132,6 +134,16 @@ def forecast(
     made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
     made.samples.extend([made, *others])
     return made
+
+
+def _astray(clip: Clip) -> list[tuple[str, ...] | None]:
+    """The joints of each of several bodies whose last frame has nothing to do with the one before; None for
+    all that there are."""
+    bodies = meant(clip.skeleton)
+    odd = [joints for joints in bodies if len(clip) - 1 in strays(clip_of(clip, joints))]
+    if odd == [*bodies]:
+        return [None] if bodies or len(clip) - 1 in strays(clip) else []
+    return [tuple(clip.skeleton.names[joint] for joint in joints) for joints in odd]
 
 
 def _noted(done: Completion, note: str) -> Completion:
