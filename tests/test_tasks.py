@@ -1084,6 +1084,22 @@ def test_a_body_that_is_lost_for_a_moment_beside_another_is_a_gap(duo, cmu_walk)
     assert not done.report.moments
 
 
+def test_a_body_that_is_lost_for_a_moment_beside_a_prop_is_a_gap(cmu_walk):
+    """As it is beside another body: what it holds tells nothing of it."""
+    old, count = cmu_walk.skeleton, len(cmu_walk)
+    skeleton = Skeleton(
+        (*old.names, "Ball"), (*old.parents, -1), np.vstack([old.rest_translation, [[1.0, 0, 0]]])
+    )
+    ball = np.tile(rotations.identity(), (count, 1, 1)), np.tile([1.0, 0.0, 0.0], (count, 1, 1))
+    motion = (np.concatenate(both, axis=1) for both in zip((cmu_walk.rotation, cmu_walk.translation), ball))
+    clip = Clip(skeleton, *motion, cmu_walk.fps, (*cmu_walk.translated, len(old)))
+    seen = Observation.full(clip)
+    seen.rotation[60:68, : len(old)] = seen.translation[60:68, : len(old)] = False
+    done = tasks.fill(clip, seen)
+    assert [(gap.start, gap.stop) for gap in done.report.gaps] == [(60, 68)]
+    assert not done.report.moments
+
+
 def test_what_is_lost_for_moments_stays_open_where_it_lasts_longer_than_allowed(cmu_walk):
     arm, seen = cmu_walk.skeleton.index("LeftForeArm"), Observation.full(cmu_walk)
     seen.rotation[60:68, arm] = False

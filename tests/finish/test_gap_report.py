@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from interpose.finish import complete
-from interpose.finish.gap_report import PARTS
+from interpose.finish.gap_report import PARTS, _part
 from interpose.methods.base import small
 from interpose.observation import Gap, Observation
 from interpose.skeletons import find_mapping
@@ -38,6 +40,19 @@ def test_errors_are_expected_of_the_joints_that_are_not_known(cmu_walk, joints, 
     assert report.expected == pytest.approx(share * said * len(canonical) / hidden)
     off = np.linalg.norm(done.clip.positions() - cmu_walk.positions(), axis=-1)[75:120][:, canonical]
     assert 0.3 < report.expected / (100 * off.sum() / (45 * hidden)) < 3
+
+
+def test_a_part_begins_where_it_does_also_on_a_rig_that_lacks_a_joint_of_it(cmu_walk):
+    """Bandai-Namco's spine has one joint less: what is above it hangs from the one below."""
+    lacking = replace(cmu_walk.skeleton, roles={"Spine1": ""})
+    said = []
+    for skeleton in (cmu_walk.skeleton, lacking):
+        clip = replace(cmu_walk, skeleton=skeleton, source=None)
+        mapping = find_mapping(skeleton)
+        upper = tuple(np.array(skeleton.names)[skeleton.below[:, mapping["Spine"]]])
+        seen = Observation.from_gaps(clip, [Gap(75, 120, upper)])
+        said.append(_part(clip, seen.slice(75, 120)))
+    assert said == [PARTS["Spine"]] * 2
 
 
 def test_nothing_is_expected_of_methods_that_do_not_say_it(cmu_walk):

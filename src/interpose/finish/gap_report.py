@@ -127,13 +127,19 @@ def _part(clip: Clip, known: Observation) -> float:
     topmost joints of it, in the mean."""
     rows = dict(zip(*find_mapping(clip.skeleton).mapped))
     lost = {joint for joint, row in rows.items() if not known.rotation[:, row].all()}
-    tops = [joint for joint in lost if PARENTS[joint] not in lost]
+    tops = [joint for joint in lost if _above(joint, {*rows}) not in lost]
     if not tops or lost == {*rows} or len(known.rotation) > MEASURED * clip.fps:
         return 1.0
     names = [JOINTS[joint].removeprefix("Left").removeprefix("Right") for joint in tops]
     return float(
         np.mean([PARTS.get(name, PART) if name != "Hips" or len(lost) == 1 else 1.0 for name in names])
     )
+
+
+def _above(joint: int, rows: set[int]) -> int:
+    """The canonical joint among those that a skeleton has that another one hangs from; -1 for none."""
+    above = PARENTS[joint]
+    return above if above < 0 or above in rows else _above(above, rows)
 
 
 def provenance(

@@ -14,7 +14,8 @@ from interpose.geometry.time import runs
 from interpose.methods.classical import Spline
 from interpose.observation import Observation
 from interpose.observation.broken import roughness
-from interpose.skeletons.performers import performers
+from interpose.skeletons import find_mapping
+from interpose.skeletons.performers import by_itself, performers
 
 MOMENT = 0.37  # seconds: values of single joints that are lost for at most so long are interpolated
 # A moment is mended by the shortest way where velocities jump by less than this share of what they do else.
@@ -32,8 +33,11 @@ def momentary(clip: Clip, observation: Observation, max_gap: int | None) -> Obse
     """
     longest = min(round(MOMENT * clip.fps), len(clip) if max_gap is None else max_gap)
     some = np.empty(observation.rotation.shape, bool)
-    for body in performers(clip.skeleton) or (range(len(clip.skeleton)),):
-        some[:, list(body)] = observation.rotation[:, list(body)].any(axis=1, keepdims=True)
+    for body in performers(clip.skeleton) or (tuple(range(len(clip.skeleton))),):
+        own, mapping = list(body), find_mapping(by_itself(clip.skeleton, body))
+        # What goes along with a body, as a prop in its hands, tells nothing of it.
+        told = [own[joint] for joint in mapping.mapped[1]] if mapping.usable else own
+        some[:, own] = observation.rotation[:, told].any(axis=1, keepdims=True)
     masks: list[np.ndarray] = []
     for known in (observation.rotation, observation.translation):
         lost = np.zeros(known.shape, bool)
