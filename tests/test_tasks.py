@@ -1133,6 +1133,10 @@ def test_a_forecast_makes_the_last_frame_anew_of_whom_it_does_not_belong_to(duo)
     assert off.mean() < 0.2 * rotations.angle(rotation[last, count:], duo.rotation[last, count:]).mean()
     (note,) = {note for gap in done.report.gaps for note in gap.notes if "made anew" in note}
     assert note.startswith(f"frame {last} of B_Hips")
+    said = replace(odd, skeleton=replace(odd.skeleton, roles={"root": "B_Hips"}), source=None)
+    meant = tasks.forecast(said, 30, method="small").clip
+    assert np.array_equal(meant.rotation[last, :count], odd.rotation[last, :count])
+    assert not np.array_equal(meant.rotation[last, count:], odd.rotation[last, count:])
     rotation[last] = duo.skeleton.rest_rotation
     both = tasks.forecast(duo.with_motion(rotation, duo.translation), 30, method="small")
     assert both.start == last

@@ -16,7 +16,7 @@ from interpose.methods import registry
 from interpose.methods.protocol import Method, Sampler
 from interpose.observation import Gap, Observation, timeline
 from interpose.observation.scan import strays
-from interpose.skeletons.performers import clip_of, meant
+from interpose.skeletons.performers import clip_of, performers
 from interpose.tasks.filling import fill
 from interpose.tasks.planning import plan, seed_of
 
@@ -139,7 +139,7 @@ def forecast(
 def _astray(clip: Clip) -> list[tuple[str, ...] | None]:
     """The joints of each of several bodies whose last frame has nothing to do with the one before; None for
     all that there are."""
-    bodies = meant(clip.skeleton)
+    bodies = performers(clip.skeleton)
     odd = [joints for joints in bodies if len(clip) - 1 in strays(clip_of(clip, joints))]
     if odd == [*bodies]:
         return [None] if bodies or len(clip) - 1 in strays(clip) else []
