@@ -225,6 +225,33 @@ def test_a_run_that_gets_lost_ends_and_what_it_had_saved_stays(tmp_path):
     assert "NaN" not in (tmp_path / "log.jsonl").read_text()
 
 
+def test_a_second_run_in_a_folder_is_refused_while_the_first_goes_on(tmp_path):
+    model, told = torch.nn.Linear(1, 1), []
+
+    def trainer(loss):  # type: ignore[no-untyped-def]
+        settings, budget = Settings(), Budget.parse("1steps")
+        return Trainer(model, loss, lambda averaged: {}, tmp_path, budget, settings, told.append)
+
+    def meanwhile(rng, fraction):  # type: ignore[no-untyped-def]
+        with pytest.raises(RequestError, match="another run is training there"):
+            trainer(lambda rng, fraction: model.weight.sum()).go("second")
+        return model.weight.sum()
+
+    trainer(meanwhile).go("first")
+    assert "second" not in told
+    trainer(meanwhile).go("third")  # the first has ended
+    assert "third" in told
+
+
+def test_a_run_that_is_through_writes_its_average_again_where_it_is_lost(train, tmp_path):
+    train(2)
+    whole = torch.load(tmp_path / "averaged.pt", weights_only=True)
+    (tmp_path / "averaged.pt").unlink()
+    train(2)
+    again = torch.load(tmp_path / "averaged.pt", weights_only=True)
+    assert all(torch.equal(again[name], whole[name]) for name in whole)
+
+
 @pytest.mark.parametrize("changes", [{"velocities": 0}, {"layers": 5}])
 def test_weights_are_not_said_to_be_wired_otherwise(changes):
     small = weights.find("small")

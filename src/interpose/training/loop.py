@@ -12,7 +12,8 @@ import signal
 import subprocess
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass, fields
 from importlib.util import find_spec
 from pathlib import Path
@@ -20,6 +21,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 import torch
+from filelock import FileLock, Timeout
 from torch import Tensor, nn
 from torch import distributed as dist
 
@@ -189,6 +191,20 @@ class Stop:
             signal.signal(number, handler)
 
 
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Within it no other run may write into the folder. RequestError where one does so already."""
+    try:
+        with FileLock(folder / "run.lock", timeout=0):
+            yield
+    except Timeout:
+        raise RequestError(
+            f"cannot train in {folder}",
+            "another run is training there",
+            "Wait for its end, or name another folder with --out.",
+        ) from None
+
+
 def _without(values: dict[str, Any], *names: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if name not in names}
 
@@ -324,6 +340,8 @@ class Trainer:
             ) from None
         self.rng = np.random.default_rng([self.settings.seed, rank(), state["steps"]])
         self.budget.spent_seconds, self.budget.spent_steps = state["seconds"], state["steps"]
+        if rank() == 0 and not (self.folder / "averaged.pt").exists():
+            self.save()  # what is exported: a run that has spent its budget would write it no more
         return True
 
     def _stay(self, kept: dict[str, Any]) -> None:
@@ -370,13 +388,17 @@ class Trainer:
             log = start.path.with_name("log.jsonl")
             (self.folder / "earlier.jsonl").write_text(log.read_text() if log.exists() else "")
 
-    def go(self, what: str, start: Card | None = None) -> Any:
+    def go(self, what: str, start: Card | None = None) -> nn.Module:
         """Say what is trained, and train it or go on with it; the averaged model comes back.
 
         Args:
             what: in words.
             start: the weights that the model was filled with, if any.
         """
+        with _alone(self.folder) if rank() == 0 else nullcontext():
+            return self._go(what, start)
+
+    def _go(self, what: str, start: Card | None) -> nn.Module:
         self._begin(start)
         if start:
             # Else weights that were trained with the same seed would learn from the same batches once more.
