@@ -1131,8 +1131,10 @@ def test_a_forecast_makes_the_last_frame_anew_of_whom_it_does_not_belong_to(duo)
     assert np.array_equal(done.clip.translation[: last + 1, 0], odd.translation[:, 0])
     off = rotations.angle(done.clip.rotation[last, count:], duo.rotation[last, count:])
     assert off.mean() < 0.2 * rotations.angle(rotation[last, count:], duo.rotation[last, count:]).mean()
-    (note,) = {note for gap in done.report.gaps for note in gap.notes if "made anew" in note}
+    ((gap, note),) = ((gap, note) for gap in done.report.gaps for note in gap.notes if "made anew" in note)
     assert note.startswith(f"frame {last} of B_Hips")
+    assert "B_Hips" in gap.joints
+    assert done.start == last
     said = replace(odd, skeleton=replace(odd.skeleton, roles={"root": "B_Hips"}), source=None)
     meant = tasks.forecast(said, 30, method="small").clip
     assert np.array_equal(meant.rotation[last, :count], odd.rotation[last, :count])

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+import shlex
+
 import pytest
 
 from interpose.formats import load
@@ -72,3 +75,18 @@ def test_a_report_is_compared_with_its_path(run, take):
     assert run("fill", "take.bvh", "--gap", "60:80", "--path", f"70:{x},{z}", "--method", "spline").code == 0
     done = run("compare", "take.bvh", "--gaps", "take.filled.json", "--methods", "linear,spline", "--json")
     assert [one["gaps"][0]["path"] is not None for one in done.json["compared"]] == [True, True]
+
+
+def test_the_command_that_it_names_fills_what_was_compared(run, take):
+    """All gaps of it, of the file as it was read, whatever its name is."""
+    take = take.rename(take.with_name("my take.bvh"))
+    listed = take.with_name("my gaps.json")
+    listed.write_text('[{"frames": "20:30"}]')
+    asked = ("--gaps", listed.name, "--gap", "50:60", "--unit", "0.05")
+    done = run("compare", take.name, *asked, "--methods", "linear,spline")
+    (line,) = (line for line in done.out.splitlines() if line.endswith("writes one of them."))
+    words = shlex.split(line.replace("NAME", "spline").removesuffix(" writes one of them."))
+    assert words[:2] == ["interpose", "fill"]
+    report = json.loads(run(*words[1:], "--dry-run", "--json").out)
+    assert [gap["frames"] for gap in report["would_fill"]] == ["20:30", "50:60"]
+    assert (report["unit"], report["unit_how"]) == (0.05, "given")

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import interpose
+from interpose import formats
 from interpose.formats import load
 
 
@@ -66,7 +67,8 @@ def test_nothing_is_replaced_unasked(run, walk):
     [
         (("--frames", "0"), "cannot generate 0 frames"),
         (("--frames", "100000000"), "are more than 10 minutes"),
-        (("--samples", "0"), "cannot forecast 0 samples"),
+        (("--samples", "0"), "--samples"),
+        (("--samples", "0", "--skip-existing"), "--samples"),
         (("--samples", "3", "--method", "linear"), "it has one answer only"),
         (("--temperature", "2", "--method", "linear"), "linear has no temperature"),
         (("--temperature", "-1"), "cannot sample at temperature -1"),
@@ -80,6 +82,28 @@ def test_what_cannot_be_asked_for(run, walk, options, said):
     assert done.code == 2
     assert said in done.err
     assert not walk.with_name("walk.forecast.bvh").exists()
+
+
+def test_of_several_samples_all_are_replaced_or_none(run, walk, monkeypatch):
+    """A report beside samples of two runs would tell of neither."""
+    asked = ("forecast", "walk.bvh", "--method", "stmi-gan", "--samples", "2", "--frames", "15", "--player")
+    assert run(*asked, "--seed", "1").code == 0
+    files = sorted(walk.parent.glob("walk.forecast*"))
+    assert len(files) == 4
+    before, written = [path.read_bytes() for path in files], formats.FORMATS[".bvh"].write
+    left = iter([True, False])
+
+    def full(clip, stream):  # type: ignore[no-untyped-def]
+        if next(left):
+            return written(clip, stream)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setitem(formats.FORMATS, ".bvh", formats.FORMATS[".bvh"]._replace(write=full))
+    done = run(*asked, "--seed", "7", "--force")
+    assert done.code == 3
+    assert "No space left" in done.err
+    assert [path.read_bytes() for path in files] == before
+    assert sorted(walk.parent.iterdir()) == sorted([walk, *files])
 
 
 def test_from_python(walk):

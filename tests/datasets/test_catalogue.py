@@ -67,6 +67,18 @@ def test_entries_know_performer_label_and_split(published):
 def test_cmu_loses_its_rest_pose(published):
     entry = clips("cmu", published, "train")[0]
     assert len(entry.load()) == len(load(entry.path)) - 1
+    assert entry.seconds() == pytest.approx(len(entry.load()) / entry.load().fps, rel=1e-4)
+
+
+def test_files_of_other_names_are_none_of_a_data_set(published):
+    folder = published / "bandai/Bandai-Namco-Research-Motiondataset-1/data"
+    before = len(clips("bandai", published))
+    shutil.copy(folder / "dataset-1_bow_normal_001.bvh", folder / "dataset-1_bow_normal_001_copy.bvh")
+    assert len(clips("bandai", published)) == before
+    (published / "hdm05").mkdir()
+    for name in ("HDM_test.amc", "HDM_bd_walk_001_120.amc"):
+        (published / "hdm05" / name).touch()
+    assert [entry.performer for entry in clips("hdm05", published)] == ["bd"]
 
 
 def test_pack_holds_positions_and_no_test_performer(published, tmp_path):
@@ -103,6 +115,14 @@ def test_what_is_not_there_is_said(tmp_path):
         clips("lafan1", tmp_path)
     with pytest.raises(RequestError, match="Did you mean lafan1"):
         clips("lafan", tmp_path)
+    (tmp_path / "lafan1").mkdir()
+    (tmp_path / "lafan1" / "walk1_subject1.bvh").touch()
+    with pytest.raises(RequestError, match="unknown split: validate"):
+        clips("lafan1", tmp_path, "validate")
     (tmp_path / "x.npz").write_bytes(b"no pack")
     with pytest.raises(FileError, match="cannot read the pack"):
         Pack.load(tmp_path / "x.npz")
+    with (tmp_path / "y.npz").open("wb") as file:
+        np.save(file, np.zeros(3))  # one array, and no archive of several
+    with pytest.raises(FileError, match="cannot read the pack"):
+        Pack.load(tmp_path / "y.npz")

@@ -161,6 +161,16 @@ def test_between_turns_one_direction_into_another(kind):
     assert distance(kind.numpy(nothing), np.array([1.0, 0, 0, 0])) < kind.tolerance
 
 
+@pytest.mark.parametrize("off", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_between_nearly_opposite_directions_misses_by_rounding_alone(kind, off):
+    """It turned half about some axis, off by all that was left: up to .08 degrees."""
+    a = np.array([[0.6, 0.0, 0.8], [0.0, 1.0, 0.0]])
+    across = np.array([[0.0, 1.0, 0.0], [0.6, 0.0, 0.8]])
+    b = -np.cos(off) * a + np.sin(off) * across
+    turned = scipy(kind.numpy(rotations.between(kind.array(a), kind.array(b)))).apply(a)
+    np.testing.assert_allclose(turned, b, atol=2 * kind.tolerance**0.5 if kind.tolerance > 1e-9 else 1e-7)
+
+
 def test_twist_leaves_a_swing_across_the_axis(kind):
     q = quaternions()
     axis = np.random.default_rng(1).normal(size=(200, 3))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from interpose import tasks
 from interpose.errors import RequestError
 from interpose.geometry import rotations
-from interpose.methods import cmib, registry
+from interpose.methods import auto, cmib, registry, weights
 from interpose.methods.bodies import observed_body
 from interpose.methods.cmib import passes
 from interpose.observation import Gap, Observation
@@ -104,3 +106,35 @@ def test_keys_closer_than_the_grid_do_not_take_each_other_s_place(cmu_walk, monk
     body = observed_body(clip, seen)
     assert way == pytest.approx(true * body.scale, rel=1e-3)
     assert np.linalg.norm(said.root[13:26] - clip.root[13:26], axis=-1).max() < 0.1
+
+
+def test_the_motion_goes_through_keys_that_do_not_lie_on_its_grid(cmu_walk):
+    """At 120 fps three frames of four do not: it went there half a frame of its own too early or late."""
+    fast = resample(cmu_walk, 120.0, smooth=True)
+
+    def jump(key: int) -> float:
+        seen = Observation.from_gaps(fast, [Gap(81, key), Gap(key + 1, 240)])
+        hips = registry.get("cmib").complete(fast, seen).clip.root[key - 2 : key + 3]
+        return float(np.linalg.norm(np.diff(hips, n=2, axis=0), axis=-1).max())
+
+    for off in (1, 2, 3):
+        assert jump(160 + off) < 2 * jump(160) + 1e-4
+
+
+@pytest.mark.parametrize("fps", [29.9994, 30.0, 30.0003])
+def test_the_last_digits_of_a_frame_rate_make_no_gap_too_long(cmu_walk, fps):
+    clip = replace(resample(cmu_walk, 60.0), fps=fps)
+    cmib, cae = registry.get("cmib"), registry.get("cae")
+    assert cmib.refuses(clip, Gap(2, 2 + cmib.card.max_gap)) is None
+    assert "129 it can fill" in cmib.refuses(clip, Gap(2, 3 + cmib.card.max_gap))
+    assert cae.refuses(clip, Gap(2, 2 + cae.card.max_gap)) is None
+    assert auto.choose(clip, Gap(60, 60 + weights.find("base").auto["from_gap"]))[0].name == "base"
+
+
+def test_of_few_frames_a_second_the_way_to_the_keys_counts_too(cmu_walk):
+    """Three frames at .5 fps are 180 of its own, and four steps from key to key 240."""
+    slow = replace(cmu_walk.slice(0, 12), fps=0.75)
+    refused = [registry.get("cmib").refuses(slow, Gap(4, 4 + length)) for length in (2, 3)]
+    assert refused[0] is None
+    assert "more than the 129" in refused[1]
+    assert [gap.method for gap in tasks.fill(slow, [Gap(4, 7)], "cmib").report.gaps] != ["cmib"]

@@ -99,6 +99,17 @@ def wheel_alone(monkeypatch, tmp_path):
     weights.cards.cache_clear()
 
 
+def test_base_alone_is_asked_where_small_is_not_installed(walk, tmp_path, wheel_alone):
+    """And what else lies beside the weights stops nobody."""
+    (tmp_path / "inside" / "base").symlink_to(ROOT / "weights" / "base", target_is_directory=True)
+    (tmp_path / "inside" / "mine").mkdir()
+    (tmp_path / "inside" / "mine" / "log.json").write_text("{}")
+    weights.cards.cache_clear()
+    done = interpose.fill(walk, second(walk))
+    assert [gap.method for gap in done.report.gaps] == ["base"]
+    assert [told["name"] for told in done.report.gaps[0].weights] == ["base"]
+
+
 def test_without_weights_for_research(walk, monkeypatch, tmp_path, wheel_alone):
     """Open weights stand in."""
     assert [card.name for card in weights.cards()] == ["small-open"]

@@ -121,6 +121,12 @@ def test_weights_by_name_or_by_folder(tmp_path):
         weights.card("nowhere")
 
 
+def test_a_path_is_no_name_of_a_method():
+    with pytest.raises(RequestError, match="no folder base") as error:
+        registry.get(Path("base"))
+    assert 'Give the text "base"' in error.value.fix
+
+
 def copied(name: str, folder: Path) -> Path:
     """Installed weights in a folder of somebody's own."""
     card = weights.card(name)

@@ -135,6 +135,8 @@ def test_a_network_that_has_grown_says_what_the_smaller_one_does(given, model):
     for other in (replace(TINY, width=36, heads=3), replace(TINY, width=48)):
         with pytest.raises(RequestError, match="width 48 with 4 heads"):
             Base(other).grow(model)
+    with pytest.raises(RequestError, match="cannot begin with another one"):
+        Base(replace(TINY, width=48, heads=4, longest=TINY.longest + 1)).grow(model)
 
 
 def test_the_starting_point_goes_on_as_the_motion_does():

@@ -72,6 +72,13 @@ def test_a_take_that_is_there_twice_is_not_learned_from_and_held_out(takes):
     assert sum("once more" in line for line in said) == 2
 
 
+def test_a_take_that_is_walked_in_place_is_another_one(takes):
+    clip, count = load(takes / "a.bvh"), len(own_pack(takes, 56).names)
+    here = clip.with_motion(clip.rotation, np.repeat(clip.translation[:1], len(clip), axis=0))
+    save(here, takes / "treadmill.bvh")
+    assert len(own_pack(takes, 56).names) > count
+
+
 def test_what_interpose_made_is_no_take(takes):
     """What else lies beside a take, as the labels of Bandai-Namco's, is no report."""
     shutil.copy(takes / "a.bvh", takes / "a.filled.bvh")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from shlex import quote
+from shlex import join
 from typing import TYPE_CHECKING, Annotated
 
 from cyclopts import Parameter
@@ -126,9 +126,12 @@ def compare(
     for name in [name for name in chosen if name not in done]:
         say(f"{name} is left out: it does not fill this")
     say(f"\nwrote {page}: it plays them over each other, or side by side")
-    which = " ".join(f"--gap {text}" for text in gap) + (f" --joints {','.join(joints)}" if joints else "")
-    which = f"--gaps {quote(str(gaps))}" if gaps else which
-    say(f"interpose fill {quote(str(file))} {which} --method NAME writes one of them.".replace("  ", " "))
+    words = [word for text in gap for word in ("--gap", text)]
+    words += ["--joints", ",".join(joints)] if joints else []
+    words += ["--gaps", str(gaps)] if gaps else []
+    words += ["--seed", str(seed)] if seed is not None else []
+    which = join([*words, "--method", "NAME"])
+    say(f"interpose fill {reading.named(file)} {which} writes one of them.")
     return 0
 
 

@@ -11,7 +11,6 @@ from cyclopts import App
 from interpose.cli.console import say, say_json, say_table
 from interpose.errors import RequestError
 
-SPLITS = ("train", "validation", "test")
 LABELS = 12  # as many are printed, the frequent ones first
 
 data = App(name="data", help="The public data sets: what is there, and packing it for training.")
@@ -25,7 +24,7 @@ def info(*, data: Path = Path("data"), json: bool = False) -> None:
         data: the folder with the unpacked data sets; docs/data.md says where to get them.
         json: print JSON for other programs.
     """
-    from interpose.datasets import DATASETS, clips
+    from interpose.datasets import DATASETS, SPLITS, clips
     from interpose.errors import FileError
 
     if not data.is_dir():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -12,7 +13,7 @@ from interpose.cli.batch import each
 from interpose.cli.console import progress, say, say_json
 from interpose.cli.outputs import Outputs, beside, licence, print_report, to_json
 from interpose.cli.reading import Reading, describe
-from interpose.cli.whole import Whole
+from interpose.cli.whole import Count, Whole
 from interpose.errors import RequestError
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def forecast(
     /,
     *,
     frames: str | None = None,
-    samples: Whole = 1,
+    samples: Count = 1,
     seed: Whole | None = None,
     temperature: float = 1.0,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
@@ -77,7 +78,7 @@ def forecast(
     """
     from interpose import tasks
     from interpose.cli.request import check_method
-    from interpose.formats import save
+    from interpose.formats import saving
     from interpose.observation.observation import frames_of
     from interpose.tasks.forecasting import FIRST
 
@@ -100,9 +101,10 @@ def forecast(
     report["units"] = {**report["units"], "spread": "cm"}
     page = _page(done, outputs.clip.name) if outputs.page else ""
     notes: dict[str, None] = {}
-    with beside(outputs, report, page):
+    # All samples, or none of them, and what tells of them.
+    with beside(outputs, report, page), ExitStack() as stack:
         for path, sample in zip(clips, done.samples):
-            notes |= dict.fromkeys(save(sample.clip, path, force=force))
+            notes |= dict.fromkeys(stack.enter_context(saving(sample.clip, path, force=force)))
     if json:
         say_json(report)
         return 0
@@ -158,7 +160,7 @@ def _page(done: Forecast, title: str) -> str:
     several = len(done.samples) > 1
     takes = [
         Take(f"sample {i + 1}" if several else "forecast", one.clip.positions(), COLORS[i % len(COLORS)])
-        for i, one in enumerate(done.samples[: len(COLORS)])
+        for i, one in enumerate(done.samples)
     ]
     clip, skeleton = done.clip, done.clip.skeleton
     span = (max(0, done.start - round(4 * clip.fps)), len(clip)) if _long(clip, len(takes)) else None

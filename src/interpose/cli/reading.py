@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from shlex import join
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -47,6 +48,12 @@ class Reading:
     root: Annotated[
         str | None, Parameter(help="The root joint of the character to use, if a file has several.")
     ] = None
+
+    def named(self, path: Path, part: str = "") -> str:
+        """A file, or a part of one, on a command line that reads it in the same way."""
+        said = {field.name: getattr(self, field.name) for field in fields(self)}
+        options = [f"--{name.replace('_', '-')}={value}" for name, value in said.items() if value is not None]
+        return join([f"{path}#{part}" if part else str(path), *options])
 
     def load(self, path: Path, roles: Mapping[str, str] = MappingProxyType({})) -> Clip:
         """The clip in a file; `roles` of its joints stand where no --map is given."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from shlex import quote
 from typing import Annotated, Any
 
 from cyclopts import Parameter
@@ -104,12 +103,13 @@ def recover(
     if not (done.report.gaps or done.report.moments or done.report.exchanged):
         fix = "Name joints that are lost for longer: --joints LeftArm."
         if stays(clip):
-            fix = f"It never leaves its place: interpose recover {file} --place tells where it goes."
+            same = f"interpose recover {reading.named(file)}"
+            fix = f"It never leaves its place: {same} --place tells where it goes."
         fix = sides or fix
         raise NothingError(
             f"there is nothing to recover in {file}",
             "no joint snaps to its rest pose, spikes, changes sides, or jumps away and back within moments",
-            f"interpose fill {file} fills what else is missing." if others else fix,
+            f"interpose fill {reading.named(file)} fills what else is missing." if others else fix,
             f"{len(others)} gaps, which `interpose fill` fills" if others else "",
             4 if others else 0,
         )
@@ -125,7 +125,7 @@ def recover(
     )
     if sides and not json:
         say(sides)
-    next_ = quote(str(file if dry_run else outputs.clip))
+    next_ = reading.named(file if dry_run else outputs.clip)
     if again and not json:
         say(f"Stuck, now that the rest moves: {', '.join(again[:SHOWN])}")
         say(f"interpose recover {next_}, once more, restores it.")

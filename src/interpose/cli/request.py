@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 import numpy as np
@@ -169,7 +170,7 @@ def _scanned(file: Path, clip: Clip) -> Request:
     left = f"{' and '.join(kinds)}, which `interpose recover` restores" if kinds else ""
     if not gaps:
         seen = [what for kind, what in LEFT.items() if any(one.kind == kind for one in found)]
-        but = left or (f"{' and '.join(seen)}: interpose scan {file} says more" if seen else "")
+        but = left or (f"{' and '.join(seen)}: interpose scan {quote(str(file))} says more" if seen else "")
         why = "no --gap is given, and a scan finds nothing missing" + (f" but {but}" if but else "")
         raise NothingError(f"nothing to fill in {file}", why, fix, left, 4 if stuck or sides else 0)
     lines = ["no --gap is given, so what a scan finds is filled:"]

@@ -44,7 +44,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
     from interpose.skeletons.carrier import line_of
     from interpose.skeletons.performers import clip_of, meant
 
-    clip = reading.load(file)
+    clip, named = reading.load(file), reading.named(file)
     made = _made(file, clip)
     # What a network says is as smooth as what a program splines: it is not to be filled once more.
     found = [
@@ -74,7 +74,7 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"the {count} joints of {name} are another body, which no network knows")
     if made:
         say(f"filled by interpose, as the report beside it says: {', '.join(_frames(made))}")
-    where = f"It never leaves its place: interpose recover {quote(str(file))} --place tells where it goes."
+    where = f"It never leaves its place: interpose recover {named} --place tells where it goes."
     suit = [where] if stays(clip) and legs(clip.skeleton) else []
     if not found:
         say("\n".join(["nothing looks missing", *suit]))
@@ -95,16 +95,16 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
         say(f"and {len(found) - len(shown)} more that are lost or doubled; --json lists them all")
     say()
     if to_gaps(found):
-        say(f"interpose fill {quote(str(file))} fills the gaps; --gap START:STOP names one yourself.")
+        say(f"interpose fill {named} fills the gaps; --gap START:STOP names one yourself.")
     if led := [one for one in found if one.kind == "splined"]:
         part = "" if led[0].joints is None else f" --joints {quote(','.join(led[0].joints))}"
         gap = f"--gap {led[0].start}:{led[0].stop}{part}"
-        say(f"interpose fill {quote(str(file))} {gap} fills anew what is splined first.")
+        say(f"interpose fill {named} {gap} fills anew what is splined first.")
     if dropped:
-        say(f"interpose recover {quote(str(file))} restores what is lost for moments.")
+        say(f"interpose recover {named} restores what is lost for moments.")
     sides = [one for one in found if one.kind in ("exchanged", "flipped")]
     if any(OR not in one.note for one in sides):
-        say(f"interpose recover {quote(str(file))} puts limbs back.")
+        say(f"interpose recover {named} puts limbs back.")
     limbs: dict[object, list[int]] = {}
     for one in sides:
         if OR in one.note:
@@ -115,13 +115,13 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             ", then ".join(f"{a}:{b}" for a, b in zip(some[::2], some[1::2]) if a < b)
             for some in (cuts, [0, *cuts, len(clip)])
         )
-        part = f"interpose recover {quote(str(file))} --frames {here}"
+        part = f"interpose recover {named} --frames {here}"
         say(f"{part} puts limbs back there; if they are wrong elsewhere, --frames {there}.")
     if any(one.kind == "noisy" for one in found):
-        say(f"interpose denoise {quote(str(file))} smooths what trembles.")
+        say(f"interpose denoise {named} smooths what trembles.")
     if any(one.kind == "repeated" for one in found):
         even = quote(str(file.with_name(f"{file.stem}.even{file.suffix}")))
-        say(f"interpose convert {quote(str(file))} {even} --drop-repeated takes repeated frames out.")
+        say(f"interpose convert {named} {even} --drop-repeated takes repeated frames out.")
     jumps = [one for one in found if one.kind == "jump"]
     if jumps:
         first, room = jumps[0].start, max(2, round(EASED * clip.fps))
@@ -133,25 +133,25 @@ def scan(file: Path, /, *, json: bool = False, reading: Reading = Reading()) -> 
             gap, what = f"0:{first}", "fills anew what is before the first jump"
         elif left <= moment:
             gap, what = f"{first}:{len(clip)}", "fills anew what follows the first jump"
-        said = f"interpose fill {quote(str(file))} --gap {gap}"
+        said = f"interpose fill {named} --gap {gap}"
         if jumps[0].joints is not None:
             said += f" --joints {quote(','.join(_with_below(clip, jumps[0].joints)))}"
         say(f"{said} {what}.")
         # Two frames are room for the seam. With one it is flagged in 5 of 20 excerpts of LAFAN1, with two in
         # none, and what follows is off by .4 cm in the mean instead of .2.
         if jumps[0].joints is None and moment < first < len(clip) - moment:
-            halves = " ".join(quote(f"{file}#{part}") for part in (f":{first - 1}", f"{first + 1}:"))
+            halves = f"{quote(f'{file}#:{first - 1}')} {reading.named(file, f'{first + 1}:')}"
             says = f"puts what follows where the body was; frames {first - 1} and {first} are made anew."
             say(f"interpose stitch {halves} --frames 2 {says}")
     if any(one.kind == "frozen body" for one in found):
-        say(f"interpose recover {quote(str(file))} restores a held body, its place and turns at once.")
+        say(f"interpose recover {named} restores a held body, its place and turns at once.")
     each_of = [clip_of(clip, joints) for joints in meant(clip.skeleton)] or [clip]
     body = {(one.skeleton.names[joint],) for one in each_of for joint in line_of(one)}
     stands = [one for one in found if one.kind == "frozen position"]
     if any(one.joints in body for one in stands) and legs(clip.skeleton):
-        say(f"interpose recover {quote(str(file))} tells from the feet where the body is that stands still.")
+        say(f"interpose recover {named} tells from the feet where the body is that stands still.")
     if [one for one in stands if one.joints not in body]:
-        say(f"interpose recover {quote(str(file))} leads over what else stands still.")
+        say(f"interpose recover {named} leads over what else stands still.")
     for line in suit:
         say(line)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shlex import quote
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
@@ -179,7 +180,7 @@ def _part(file: Path, whole: Clip, part: str) -> Clip:
     try:
         span = Gap.parse(part, clip=whole)
     except RequestError:
-        fix = f"Write {file}#12:80 for the frames 12 to 79."
+        fix = f"Write {quote(f'{file}#12:80')} for the frames 12 to 79."
         raise RequestError(f"cannot read the part {part} of {file}", "a part is START:STOP", fix) from None
     if not 0 <= span.start < span.stop <= len(whole):
         why = f"the clip has {len(whole)} frames, counted from 0"
@@ -195,7 +196,7 @@ def _odd(pieces: list[Piece]) -> Iterator[str]:
         if odd := strays(piece.clip):
             first, last = int(0 in odd), len(piece.clip) - int(len(piece.clip) - 1 in odd)
             start = 0 if piece.part is None else Gap.parse(piece.part, clip=piece.whole).start
-            better = f"{piece.file}#{start + first}:{start + last}"
+            better = quote(f"{piece.file}#{start + first}:{start + last}")
             what = "begins" if first else "ends"
             yield f"{piece} {what} with a frame that has nothing to do with the rest: {better} leaves it out"
 

@@ -20,6 +20,7 @@ from interpose.errors import FileError, unknown
 from interpose.formats import load
 
 FPS = 30.0
+SPLITS = ("train", "validation", "test")
 _BVH_LENGTH = re.compile(rb"Frames:\s*(\d+)\s+Frame Time:\s*([\d.eE+-]+)")
 _AMC_FRAME = re.compile(rb"^\d+\s*$", re.MULTILINE)
 
@@ -48,8 +49,12 @@ class Entry:
         if self.dataset == "h36m":
             return h36m.load(self.path, self.part)
         clip = load(self.path)
-        rest_pose = self.dataset == "cmu" and self.path.suffix == ".bvh"
-        return clip.slice(1, len(clip)) if rest_pose else clip
+        return clip.slice(1, len(clip)) if self._rests else clip
+
+    @property
+    def _rests(self) -> bool:
+        """Whether its file begins with a rest pose."""
+        return self.dataset == "cmu" and self.path.suffix == ".bvh"
 
     def seconds(self) -> float:
         """How long the clip is, without reading its motion."""
@@ -58,7 +63,7 @@ class Entry:
         if self.path.suffix == ".amc":
             return len(_AMC_FRAME.findall(self.path.read_bytes())) / 120.0
         head = _BVH_LENGTH.search(self.path.read_bytes())
-        return int(head[1]) * float(head[2]) if head else 0.0
+        return (int(head[1]) - int(self._rests)) * float(head[2]) if head else 0.0
 
 
 @cache
@@ -95,8 +100,8 @@ def _lafan1(folder: Path) -> list[Entry]:
 def _bandai(folder: Path) -> list[Entry]:
     found = []
     for path in sorted(folder.glob("*/data/*.bvh")):
-        part, content, style, _ = path.stem.split("_")
-        found.append(Entry("bandai", path, f"{part}/{style}", content))
+        if match := re.fullmatch(r"([^_]+)_([^_]+)_([^_]+)_\d+", path.stem):
+            found.append(Entry("bandai", path, f"{match[1]}/{match[3]}", match[2]))
     return found
 
 
@@ -115,8 +120,8 @@ def _cmu(folder: Path) -> list[Entry]:
 def _hdm05(folder: Path) -> list[Entry]:
     found = []
     for path in sorted(folder.glob("**/HDM_*.amc")):
-        _, performer, action, *_ = path.stem.split("_")
-        found.append(Entry("hdm05", path, performer, action))
+        if match := re.fullmatch(r"HDM_([^_]+)_([^_]+)(_.*)?", path.stem):
+            found.append(Entry("hdm05", path, match[1], match[2]))
     return found
 
 
@@ -139,10 +144,12 @@ DATASETS: dict[str, Callable[[Path], list[Entry]]] = {
 def clips(dataset: str, data: Path, split: str | None = None) -> list[Entry]:
     """The clips of a data set below `data`, all or those of one split, in a fixed order.
 
-    Raises RequestError for an unknown data set and FileError when there is nothing of it.
+    Raises RequestError for an unknown data set or split, and FileError when there is nothing of it.
     """
     if dataset not in DATASETS:
         raise unknown("data set", dataset, DATASETS)
+    if split not in (None, *SPLITS):
+        raise unknown("split", split, SPLITS)
     found = DATASETS[dataset](Path(data) / dataset)
     if not found:
         raise FileError(

@@ -52,7 +52,8 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
             progress(f"left out: {name} ({error.what}: {error.why})")
             continue
         # A copy would be learned from and held out.
-        motion = np.abs(clip.rotation).round(4).tobytes()
+        way = clip.translation - clip.translation[:1]
+        motion = np.abs(clip.rotation).round(4).tobytes() + way.round(4).tobytes()
         if reason := unfit(clip):
             progress(f"left out: {name} ({reason})")
         elif motion in same:

@@ -62,7 +62,7 @@ class Pack:
         try:
             with np.load(path) as held:
                 return cls(**{name: held[name][()] for name in cls.__dataclass_fields__})
-        except (OSError, KeyError, ValueError, EOFError, BadZipFile, zlib.error) as reason:
+        except (OSError, KeyError, ValueError, TypeError, EOFError, BadZipFile, zlib.error) as reason:
             raise FileError(
                 f"cannot read the pack {path}",
                 str(reason),

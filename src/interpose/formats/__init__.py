@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import difflib
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,7 @@ from interpose.errors import FileError, RequestError, unfit
 from interpose.formats import asf_amc, bvh, npz
 from interpose.formats.whole import replacing
 
-__all__ = ["FORMATS", "Format", "held", "load", "save"]
+__all__ = ["FORMATS", "Format", "held", "load", "save", "saving"]
 
 
 class Format(NamedTuple):
@@ -130,7 +131,14 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
         raise RequestError(f"cannot write a {type(clip).__name__}", "it is no Clip", hint)
     if not isinstance(force, bool | np.bool_ | int):
         raise unfit("force", force, "True or False")
-    path = _path(path)
+    with saving(clip, _path(path), force) as notes:
+        pass
+    return notes
+
+
+@contextmanager
+def saving(clip: Clip, path: Path, force: bool = False) -> Iterator[tuple[str, ...]]:
+    """As `save`, whose notes it gives; the file takes its place at the end, so that several do together."""
     chosen = _format(path)
     if not len(clip):
         why = "the clip has no frames, and no file without any could be read again"
@@ -139,8 +147,8 @@ def save(clip: Clip, path: str | Path, force: bool = False) -> tuple[str, ...]:
     with replacing(path) as part:
         with part.open("wb") as stream:
             notes = chosen.write(clip, stream)
+        yield (*notes, *_alone(path))
         _check_free(path, force)
-    return (*notes, *_alone(path))
 
 
 def _alone(path: Path) -> tuple[str, ...]:

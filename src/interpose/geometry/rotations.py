@@ -271,7 +271,9 @@ def between(a: Array, b: Array) -> Array:
     flip = xp.concat([xp.zeros_like(cosine), across], axis=-1)
     present = xp.sum(a * a, axis=-1, keepdims=True) * xp.sum(b * b, axis=-1, keepdims=True) > 0.5
     one = xp.concat([xp.ones_like(cosine), xp.zeros_like(a)], axis=-1)
-    q = xp.where(q[..., :1] > 1e-6, q, flip)
+    # As long as the axis across both is more than rounding.
+    clear = xp.sum(q * q, axis=-1, keepdims=True) > xp.finfo(q.dtype).eps
+    q = xp.where(clear, q, flip)
     return normalize(xp.where(present, q, one))
 
 

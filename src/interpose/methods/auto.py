@@ -44,7 +44,7 @@ def choose(clip: Clip, gap: Gap, lone: int = 0) -> tuple[Method, str | None]:
         network = registry.get(name)
         any_length = gap.joints is not None or lone == 2 or (at_end and name in AT_ENDS)
         least = 0 if any_length else card.auto["from_gap"]
-        if len(gap) * card.fps / clip.fps < least:
+        if card.frames(len(gap), clip.fps) < least:
             short = True
             continue
         reason = network.refuses(clip, gap)

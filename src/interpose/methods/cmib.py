@@ -107,8 +107,9 @@ class Cmib:
             return "it generates whole poses only"
         if gap.start == 0 or gap.stop == len(clip):
             return "it needs a whole pose on both sides"
-        length = len(gap) * self.card.fps / clip.fps
-        if length > self.card.max_gap:
+        # From key to key: at low frame rates that is far more than the frames between them.
+        if self.card.frames(len(gap) + 1, clip.fps) > self.card.max_gap + 1:
+            length = self.card.frames(len(gap), clip.fps)
             at = f"{length:.0f} frames at {self.card.fps:g} fps"
             return f"{at} are more than the {self.card.max_gap} it can fill: give keys inside of them"
         return None
@@ -148,7 +149,8 @@ class Cmib:
                 # Keys are not noisy: above 30 fps frames lie between them and the frame beside.
                 values[~known] = calm[~known]
             inside = np.setdiff1d(np.arange(first, last), keys)
-            back = (inside - first) * scale
+            # Keys lie on the grid, up to half a step from where they were: what is between goes along.
+            back = np.interp(inside, poses, at)
             root[inside] = sample_smooth(hips, back)
             turned[inside] = sample_rotations_smooth(rotations.normalize(said), back)
         done = body.to_clip(turned, root / body.scale, base)

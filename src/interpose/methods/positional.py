@@ -43,7 +43,7 @@ def refuses(clip: Clip, gap: Gap, card: weights.Card) -> str | None:
         return "no joint that the network knows hangs below these, so positions do not tell their rotation"
     if gap.joints is not None and len(gap) == len(clip) and _floats(mapping, gap.joints):
         return "both feet are lost all the time, so nothing tells it where the floor is"
-    length = len(gap) * card.fps / clip.fps
+    length = card.frames(len(gap), clip.fps)
     if gap.joints is None and length > card.max_gap:
         at = f"{length:.0f} frames at {card.fps:g} fps"
         return f"{at} are more than the {card.max_gap} it can fill: give keys inside of them"

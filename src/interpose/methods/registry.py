@@ -70,6 +70,9 @@ def get(name: str | Path | Method) -> Method:
     if not folder and (name in METHODS or name in _offered()):
         return _named(name)
     if not (name and Path(name).is_dir()):
+        if folder and name in names():
+            why = f"a path names a folder with weights, and {name} is the name of a method"
+            raise RequestError(f"there is no folder {name}", why, f'Give the text "{name}".')
         raise unknown("method", name, [*names(), "a folder with weights"])
     card = weights.within(name)
     method: Any = _named(card.method) if card.method in METHODS else None

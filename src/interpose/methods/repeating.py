@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from interpose.geometry import kinematics, rotations
-from interpose.geometry.ground import UP
+from interpose.geometry.ground import UP, wrap
 from interpose.geometry.time import ease, runs, sample, sample_rotations
 from interpose.geometry.values import moved, offset
 from interpose.skeletons import JOINTS, PARENTS
@@ -193,7 +193,7 @@ def _carried(
             way[:, 1] = root[:, 1]  # who climbed a little would go on for ever
             steps = [np.diff(one, axis=0, prepend=seen.root[begin - 1 : begin]) for one in (root, way)]
             root = seen.root[begin - 1] + np.cumsum(steps[0] + share[:, None] * (steps[1] - steps[0]), axis=0)
-            there = there + share * np.unwrap(_wrapped(turns - there))
+            there = there + share * np.unwrap(wrap(turns - there))
     turned[:, 0] = rotations.multiply(rotations.about("Y", there), turned[:, 0])
     if not periods:
         return Motion(turned, root), None
@@ -206,10 +206,6 @@ def heading(local: np.ndarray) -> np.ndarray:
     """(T,) radians by which the hips are turned about the vertical."""
     twist = rotations.twist_about(local[:, 0], UP.values)
     return 2.0 * np.arctan2(twist[:, 2], twist[:, 0])
-
-
-def _wrapped(angle: np.ndarray) -> np.ndarray:
-    return np.asarray((angle + np.pi) % (2 * np.pi) - np.pi)
 
 
 def _mixed(one: np.ndarray, other: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -235,7 +231,7 @@ def _way(seen: Motion, yaw: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.
     """Where the hips get (n, 3), and their heading (n,), if they go on from the last frame that is seen as
     they did to each of the frames `at` (n,)."""
     steps = rotations.rotate(rotations.about("Y", -yaw[:-1]), np.diff(seen.root, axis=0))
-    turns = yaw[-1] + np.cumsum(sample(_wrapped(np.diff(yaw))[:, None], at - 1)[:, 0])
+    turns = yaw[-1] + np.cumsum(sample(wrap(np.diff(yaw))[:, None], at - 1)[:, 0])
     before = np.concatenate([yaw[-1:], turns[:-1]])
     return seen.root[-1] + np.cumsum(
         rotations.rotate(rotations.about("Y", before), sample(steps, at - 1)), axis=0

@@ -72,6 +72,11 @@ class Card:
     def onnx(self) -> Path:
         return self.path.with_suffix(".onnx")
 
+    def frames(self, count: int, fps: float) -> float:
+        """How many frames at its rate as many at another one are, to a hundredth: the last digits of a file's
+        frame time tell nothing."""
+        return round(count * self.fps / fps, 2)
+
     def brief(self) -> dict[str, Any]:
         """What reports say of the weights that had a part in them."""
         return {"name": self.name, "licence": self.licence, "commit": self.training.get("commit")}
@@ -185,7 +190,9 @@ def all_installed() -> bool:
 @cache
 def cards() -> list[Card]:
     """The cards of all installed weights, by name."""
-    found = [Card.load(path) for folder in folders() for path in folder.glob("*/*.json")]
+    every = [path for folder in folders() for path in folder.glob("*/*.json")]
+    # What else lies there is none of them, and stops nobody.
+    found = [Card.load(path) for path in every if path.with_suffix(".onnx").exists()]
     return sorted(found, key=lambda card: card.name)
 
 
@@ -248,7 +255,7 @@ def allowed(card: Card) -> Card:
 def find(method: str) -> Card:
     """The weights that a method runs: those of its name, or else any. Raises RequestError when there are
     none, or none that may be used."""
-    there = [card for card in cards() if card.onnx.exists()]
+    there = cards()
     named = [card for card in there if card.name == method]
     for card in named or [card for card in there if card.method == method]:
         return allowed(card)

@@ -312,6 +312,11 @@ class Base(nn.Module):
         """
         times, rest = divmod(self.config.width, other.config.width)
         blocks, held = len(self.encoder.blocks), len(other.encoder.blocks)
+        if self.config.longest != other.config.longest:
+            why = f"it sees {other.config.longest} frames at once, and this one {self.config.longest}"
+            raise RequestError(
+                "a network cannot begin with another one", why, "Choose one that sees as many."
+            )
         if rest or self.config.heads != times * other.config.heads or blocks < held:
             raise RequestError(
                 f"a network of width {self.config.width} cannot begin with one of width {other.config.width}",

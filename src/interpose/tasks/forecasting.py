@@ -30,7 +30,8 @@ class Forecast(Completion):
     """A clip and what follows, and other ways in which it may go on.
 
     Attributes:
-        start: the first frame that is new: a last one that was no part of the motion and is made anew, too.
+        start: the first frame that is new, of any body: a last one that was no part of the motion and is made
+            anew, too.
         samples: all of them, this one first.
     """
 
@@ -56,8 +57,8 @@ def forecast(
     """Go on with a clip, from its last pose and where that is.
 
     Args:
-        clip: what is known; it comes back unchanged, but for last frames that are no part of the motion, as
-            a rest pose that ends a file: these are made anew, and a note says so.
+        clip: what is known; it comes back unchanged, but for a last frame that is no part of the motion, as
+            a rest pose that ends a file: it is made anew, of bodies of which it is so, and a note says so.
         frames: how many are added; 2 s without it.
         samples: in how many ways; seeds are counted up from `seed`, or from 1.
         method: a method, or "auto".
@@ -122,16 +123,18 @@ def forecast(
             )
         done.append(one)
     # Why it is no network's, which this was to be.
-    notes = [job.note] if job.note else []
+    if job.note:
+        done = [_noted(one, job.note) for one in done]
     for names in odd:
         whose = f" of {few(list(names))}" if names else ""
-        notes.append(f"frame {last - 1}{whose} is no part of the motion, and made anew")
-    for said in notes:
-        done = [_noted(one, said) for one in done]
+        said = f"frame {last - 1}{whose} is no part of the motion, and made anew"
+        done = [_noted(one, said, names) for one in done]
     # The report tells what was asked for; its gap, what did it.
     asked = registry.name_of(method)
     first, *others = (replace(one, report=replace(one.report, method=asked)) for one in done)
-    made = Forecast(first.clip, first.said, first.provenance, first.report, start=gap.start, samples=[])
+    made = Forecast(
+        first.clip, first.said, first.provenance, first.report, start=last - bool(odd), samples=[]
+    )
     made.samples.extend([made, *others])
     return made
 
@@ -146,7 +149,12 @@ def _astray(clip: Clip) -> list[tuple[str, ...] | None]:
     return [tuple(clip.skeleton.names[joint] for joint in joints) for joints in odd]
 
 
-def _noted(done: Completion, note: str) -> Completion:
-    """With one more note of its gap."""
-    gaps = [replace(gap, notes=(note, *gap.notes)) for gap in done.report.gaps]
+def _noted(done: Completion, note: str, whose: tuple[str, ...] | None = None) -> Completion:
+    """With one more note of its gaps, or of those of some joints alone."""
+    gaps = [
+        replace(gap, notes=(note, *gap.notes))
+        if whose is None or {*whose} & {*(gap.joints or whose)}
+        else gap
+        for gap in done.report.gaps
+    ]
     return replace(done, report=replace(done.report, gaps=gaps))

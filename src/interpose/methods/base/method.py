@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -47,8 +48,12 @@ class Base:
 
     @property
     def asked(self) -> list[weights.Card]:
-        """All weights that are asked, its own first."""
-        return [self.card, *([weights.find(self.beside)] if self.beside and not self.trained else [])]
+        """All weights that are asked, its own first; alone where the others are not installed."""
+        asked = [self.card]
+        if self.beside and not self.trained:
+            with suppress(RequestError):
+                asked.append(weights.find(self.beside))
+        return asked
 
     def for_action(self, action: str) -> Base:
         """The same method, told what the motion is. RequestError lists the actions for an unknown one."""
