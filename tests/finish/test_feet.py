@@ -432,6 +432,21 @@ def test_a_leg_that_jumps_anyway_is_held_firmly_where_that_adds_next_to_nothing(
         assert tried == list(feet.BLENDS[:blends])
 
 
+def test_feet_that_have_taken_steps_are_not_held_where_legs_would_jump_for_it(walk, monkeypatch):
+    known, leg = gaps_of(walk, (40, 80)), feet.legs(walk.skeleton)[0]
+    anything = np.full(len(walk.skeleton), 1.0)
+    rotation = walk.rotation.copy()
+    rotation[60, leg.thigh] = rotations.multiply(
+        rotation[60, leg.thigh], rotations.exp(np.array([0.3, 0, 0]))
+    )
+    torn = walk.with_motion(rotation, walk.translation)
+    monkeypatch.setattr(feet, "plant", lambda *_, **__: torn)
+    monkeypatch.setattr(feet, "measure", lambda *_: (1.0, 1.0))
+    asked = (walk, known, (40, 80), 0, anything, guarantees._usual(walk, known, anything), None)
+    assert guarantees._hold(*asked) is torn
+    assert guarantees._hold(*asked, anyway=False) is walk
+
+
 def test_feet_that_are_dragged_through_a_gap_step_as_they_do_beside_it(walk):
     known, gap = gaps_of(walk, (35, 90)), slice(35, 90)
     turned, placed = walk.kinematics()
