@@ -166,6 +166,8 @@ def test_a_rest_pose_that_is_stitched_in_is_said(run, takes):
     (note,) = [line for line in done.out.splitlines() if "nothing to do with the rest" in line]
     (better,) = shlex.split(note.split(": ")[-1].removesuffix(" leaves it out"))
     assert better.startswith("raw.bvh#1:")
+    told = run("stitch", "walk.bvh", "raw.bvh", "--frames", "9", "--force", "--json").json
+    assert [one for one in told["notes"] if better in one], "in a pipeline, too"
     again = run("stitch", "walk.bvh", better, "--frames", "9", "--force")
     assert again.code == 0
     assert "nothing to do with the rest" not in again.out

@@ -126,7 +126,11 @@ def stitch(
     clips = [piece.clip for piece in pieces]
     with progress(f"stitching {len(clips)} clips", sum(map(len, clips))) as advance:
         done = tasks.stitch(clips, _lengths(frames, clips[0].fps), align, loop, action, method, seed, advance)
+    others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
+    rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
+    remarks = [*rigs, *_odd(pieces), *_roots(pieces)]
     more = others_read((piece.file for piece in pieces), first) | _more(pieces, done)
+    more |= {"notes": remarks} if remarks else {}
     report = to_json("stitch", first, outputs.clip, done.clip, done, seed, {}, more)
     report["units"] = {**report["units"], **UNITS}
     notes = write(outputs, force, done.clip, done, report)
@@ -138,9 +142,7 @@ def stitch(
     _print_clips(pieces, done)
     say()
     print_report(done, done.clip.fps, {})
-    others = dict.fromkeys(piece.file for piece in pieces if piece.retargeted)
-    rigs = [f"{file} is on another rig: its motion was retargeted to that of {first}" for file in others]
-    said = [f"note: {note}" for note in (*rigs, *_odd(pieces), *_roots(pieces), *licence(done), *notes)]
+    said = [f"note: {note}" for note in (*remarks, *licence(done), *notes)]
     say("\n".join([*_closing(done), "", *said, outputs.told()]))
     return 0
 
