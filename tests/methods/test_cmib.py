@@ -132,9 +132,9 @@ def test_the_last_digits_of_a_frame_rate_make_no_gap_too_long(cmu_walk, fps):
 
 
 def test_of_few_frames_a_second_the_way_to_the_keys_counts_too(cmu_walk):
-    """Three frames at .5 fps are 180 of its own, and four steps from key to key 240."""
+    """Three frames at .75 fps are 120 of its own, and the four steps from key to key 160."""
     slow = replace(cmu_walk.slice(0, 12), fps=0.75)
     refused = [registry.get("cmib").refuses(slow, Gap(4, 4 + length)) for length in (2, 3)]
     assert refused[0] is None
-    assert "more than the 129" in refused[1]
+    assert "159 frames at 30 fps are more than the 129" in refused[1]
     assert [gap.method for gap in tasks.fill(slow, [Gap(4, 7)], "cmib").report.gaps] != ["cmib"]

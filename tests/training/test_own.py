@@ -72,6 +72,17 @@ def test_a_take_that_is_there_twice_is_not_learned_from_and_held_out(takes):
     assert sum("once more" in line for line in said) == 2
 
 
+def test_of_a_take_and_its_copy_zeros_may_differ_in_their_sign(takes):
+    """As numbers of another format do that are rounded to them."""
+    clip = load(takes / "a.bvh")
+    still = np.repeat(clip.translation[:1], len(clip), axis=0)
+    below = still - 1e-9 * (np.arange(len(clip)) > 0)[:, None, None]
+    save(clip.with_motion(clip.rotation, still), takes / "still.npz")
+    count = len(own_pack(takes, 56).names)
+    save(clip.with_motion(clip.rotation, below), takes / "still again.npz")
+    assert len(own_pack(takes, 56).names) == count
+
+
 def test_a_take_that_is_walked_in_place_is_another_one(takes):
     clip, count = load(takes / "a.bvh"), len(own_pack(takes, 56).names)
     here = clip.with_motion(clip.rotation, np.repeat(clip.translation[:1], len(clip), axis=0))

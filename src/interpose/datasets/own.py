@@ -53,7 +53,8 @@ def own_pack(folder: Path, shortest: int, progress: Callable[[str], None] = lamb
             continue
         # A copy would be learned from and held out.
         way = clip.translation - clip.translation[:1]
-        motion = np.abs(clip.rotation).round(4).tobytes() + way.round(4).tobytes()
+        # Zeros have no sign so, as rotations have none.
+        motion = np.abs(clip.rotation).round(4).tobytes() + (way.round(4) + 0.0).tobytes()
         if reason := unfit(clip):
             progress(f"left out: {name} ({reason})")
         elif motion in same:

@@ -3,8 +3,8 @@
 What networks say of a foot is a mean over all the moments at which it may step: where these lie apart it
 glides there, and never leaves the floor. In 100 gaps of two and three seconds of LAFAN1's validation
 performer feet drifted by more than 8 cm in a stance in 16 fills of `small`, so in 11; joints are off by as
-much, and bodies glide as seldom. Who crouches or crawls sets feet down anew, too: of 150 gaps of one to three
-seconds of two sets they drifted in 7 of `base`, so in 3 (one of which was a foot that was held too softly).
+much, and bodies glide as seldom. Who crouches or crawls sets feet down anew, too: in 50 gaps of three
+seconds feet drifted so in 6 fills of `base`, now in one (`bench artefacts --most 25`).
 """
 
 from __future__ import annotations

@@ -108,8 +108,8 @@ class Cmib:
         if gap.start == 0 or gap.stop == len(clip):
             return "it needs a whole pose on both sides"
         # From key to key: at low frame rates that is far more than the frames between them.
-        if self.card.frames(len(gap) + 1, clip.fps) > self.card.max_gap + 1:
-            length = self.card.frames(len(gap), clip.fps)
+        length = self.card.frames(len(gap) + 1, clip.fps) - 1
+        if length > self.card.max_gap:
             at = f"{length:.0f} frames at {self.card.fps:g} fps"
             return f"{at} are more than the {self.card.max_gap} it can fill: give keys inside of them"
         return None
