@@ -237,6 +237,7 @@ def test_a_batch_goes_on_where_it_stopped(run, takes, monkeypatch):
     assert [one.get("skipped", False) for one in again.json] == [True, True, False, False]
     assert [one["code"] for one in again.json] == [4] * 4
     assert "2 skipped, as their results were there; 4 with something left open" in again.err
+    assert "0 of 4 files done" in again.err, "those that are left open are none that are done"
     assert len([*takes.glob("*.filled.*")]) == 8
     for name in ("a.filled.bvh", "b.filled.json"):
         assert (takes / name).stat().st_mtime_ns == before[takes / name]
@@ -332,6 +333,14 @@ def test_a_log_in_a_narrow_encoding_takes_any_name(run, takes, monkeypatch):
     done = run("denoise", "takes/\u65e5\u672c \u00fc.bvh")
     assert done.code == 0
     assert b"\\u65e5\\u672c \xfc.denoised.bvh" in log.buffer.getvalue()  # type: ignore[attr-defined]
+
+
+def test_a_rig_that_is_no_file_of_a_known_format_says_so(run, takes):
+    for rig in ("rig", "takes"):
+        done = run("convert", "takes", "new", "--onto", rig)
+        assert done.code in (2, 3)
+        assert "should have foreseen" not in done.err
+        assert rig in done.err
 
 
 def test_a_folder_is_converted_into_a_folder(run, takes):

@@ -673,6 +673,11 @@ def test_times_in_seconds_and_where_joints_are(run, take):
     assert np.abs(off).max() < 0.002
     assert run("fill", "take.bvh", "--gap", "80:100", "--pin", f"LeftHand@99s:{place}").code == 2
     assert "there is no frame" in run("skeleton", "take.bvh", "--at", "99s").err
+    far = load(take)
+    save(far.with_motion(far.rotation, far.translation + np.array([123.0, 0.0, 0.0])), "far.bvh")
+    exact = run("skeleton", "far.bvh", "--at", "90", "--json").json["positions"]
+    told = run("skeleton", "far.bvh", "--at", "90").out.replace("\n", "")
+    assert ",".join(f"{x:.10g}" for x in exact["LeftHand"]) in told, "not to four digits"
 
 
 def test_a_dry_run_checks_and_lists_the_path(run, take):

@@ -240,6 +240,15 @@ def test_what_makes_no_sense_is_refused(cmu_walk, clips, frames, says):
         lay([cmu_walk] * clips, frames)
 
 
+def test_a_way_that_nobody_goes_is_refused_where_nobody_says_how_long_it_takes(cmu_walk):
+    """It was worked on for ever."""
+    far = cmu_walk.with_motion(cmu_walk.rotation, cmu_walk.translation + np.array([10_000.0, 0.0, 0.0]))
+    with pytest.raises(RequestError, match="cannot generate") as error:
+        lay([cmu_walk, far], "auto", align=False)
+    assert "--frames" in error.value.fix
+    assert len(lay([cmu_walk, far], 30, align=False).gaps) == 1
+
+
 def test_other_skeletons_are_refused(cmu_walk):
     skeleton = cmu_walk.skeleton
     other = replace(cmu_walk, skeleton=replace(skeleton, names=("Pelvis", *skeleton.names[1:])))

@@ -155,6 +155,7 @@ class Batch:
     as_json: bool
     codes: list[int] = field(default_factory=list)
     entries: list[Any] = field(default_factory=list)
+    done: int = 0
     skipped: int = 0
 
     def add(self, code: int, entry: Any, *, skipped: bool = False) -> None:
@@ -162,6 +163,7 @@ class Batch:
         self.codes.append(code)
         self.entries.append({**entry, "code": code} if isinstance(entry, dict) else entry)
         self.skipped += skipped
+        self.done += code == 0 and not skipped
 
     @property
     def code(self) -> int:
@@ -172,7 +174,7 @@ class Batch:
         """The list of --json, and the line that sums up, on stderr."""
         if self.as_json:
             say_json(self.entries)
-        parts = [f"{self.codes.count(0) - self.skipped} of {len(self.files)} files done"]
+        parts = [f"{self.done} of {len(self.files)} files done"]
         parts += [f"{self.skipped} skipped, as their results were there"] if self.skipped else []
         idle = sum(isinstance(entry, dict) and "nothing" in entry for entry in self.entries)
         parts += [f"{idle} with nothing to do"] if idle else []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cyclopts import Parameter
 
-from interpose.cli.batch import each
+from interpose.cli.batch import MOTION, each
 from interpose.cli.console import names, say, say_json
 from interpose.cli.reading import Reading, describe, details
 from interpose.errors import NothingError, RequestError
@@ -68,7 +68,9 @@ def convert(
         raise RequestError(
             "--to does not apply to one file", "the suffix of the output says the format", "Leave it out."
         )
-    ending = to if to is not None or onto is None or alone else onto.suffix[1:].lower()
+    # What is of no known format says so itself, as it is read.
+    ending = onto.suffix[1:].lower() if onto is not None and onto.suffix.lower() in MOTION else None
+    ending = to if to is not None or alone else ending
     each_of = each(_convert, earlier=_earlier)
     return each_of(
         file,

@@ -189,7 +189,8 @@ def _print(file: Path, clip: Clip, body: Humanoid, frame: int | None) -> None:
         say_table(("joint", "is", ""), rows)
     else:
         where = _places(clip, frame)
-        said = [",".join(f"{x:.4g}" for x in where[name]) for name in skeleton.names]
+        # All digits that --json has, as pins are written with them; and no -0.
+        said = [",".join(f"{x + 0.0:.10g}" for x in where[name]) for name in skeleton.names]
         say_table(("joint", "is", "", f"at frame {frame}"), [(*row, one) for row, one in zip(rows, said)])
     if mapping.missing and mapping.usable:
         say()

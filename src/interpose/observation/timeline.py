@@ -184,6 +184,7 @@ def lay(
         # The beginning of a loop is no later part of a take: where it lies, and how high, tells nothing.
         before, ended, later = done[-1], laid[-1].stop, number < len(clips)
         way = _way(body, carried, before, clip, count, later) if align else _as_it_lies(before, clip, count)
+        bounded(way.frames, first.fps, "Say how many (--frames, frames=), or let clips be placed (align).")
         if len(clips) == 1 and stands_still(body, first):
             way = replace(way, placement=Placement())
         start = ended + way.frames
@@ -257,13 +258,13 @@ def _way(
     return Way(count, placed, why, step is not None)
 
 
-def bounded(frames: int, fps: float) -> None:
-    """RequestError for more frames in a row than anybody makes up at once."""
+def bounded(frames: int, fps: float, fix: str = "Ask for fewer.") -> None:
+    """RequestError, with what to do, for more frames in a row than anybody makes up at once."""
     if frames > FURTHEST * fps:
         raise RequestError(
             f"cannot generate {frames} frames",
             f"at {fps:g} fps they are more than {FURTHEST / 60:g} minutes",
-            "Ask for fewer.",
+            fix,
         )
 
 
